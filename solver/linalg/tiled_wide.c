@@ -11,14 +11,17 @@
 #endif
 
 /* Groups that a thread takes at a time; fours below which one thread works; fours whose digits are converted
- * at once. */
-enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 200, CHUNK = 32 };
+ * at once; digits of a row of a four, and those behind them that a register has too: of
+ * the four that follows, which is always there. */
+enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 200, CHUNK = 32, DIGITS = 16 };
 
 #define KERNEL(name) name##_portable
 #define TARGET
 #define LANE_FLOATS 4
 #define LANES_OF(a) ((lanes){0} + (a))
 #define LANES_FMA(a, b, c) ((c) + (a) * (b))
+#define READ_DIGITS(to, from)                                                                                \
+    for (size_t l = 0; l < TILE_LANES; l++) (to)[l] = (from)[l]
 #include "solver/linalg/tiled_wide_kernels.inc"
 
 #ifdef CPU_AVX2_TARGET
@@ -27,6 +30,10 @@ enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 200, CHUNK = 32 };
 #define LANE_FLOATS 8
 #define LANES_OF(a) (lanes) _mm256_set1_ps(a)
 #define LANES_FMA(a, b, c) (lanes) _mm256_fmadd_ps((__m256)(a), (__m256)(b), (__m256)(c))
+#define READ_DIGITS(to, from)                                                                                \
+    for (size_t l = 0; l < DIGITS; l += 8)                                                                   \
+    _mm256_store_ps((to) + l, _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(                                       \
+                                  _mm_loadl_epi64((const __m128i *)(const void *)((from) + l)))))
 #include "solver/linalg/tiled_wide_kernels.inc"
 
 #define KERNEL(name) name##_avx512
@@ -34,6 +41,9 @@ enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 200, CHUNK = 32 };
 #define LANE_FLOATS 16
 #define LANES_OF(a) (lanes) _mm512_set1_ps(a)
 #define LANES_FMA(a, b, c) (lanes) _mm512_fmadd_ps((__m512)(a), (__m512)(b), (__m512)(c))
+#define READ_DIGITS(to, from)                                                                                \
+    _mm512_store_ps(to, _mm512_cvtepi32_ps(                                                                  \
+                            _mm512_cvtepi8_epi32(_mm_loadu_si128((const __m128i *)(const void *)(from)))))
 #include "solver/linalg/tiled_wide_kernels.inc"
 #endif
 

@@ -6,6 +6,7 @@
 #include "solver/operator/hierarchical_wide.h"
 
 #include "solver/base/work_area.h"
+#include "solver/operator/lane_rows.h"
 #include "solver/operator/wavelet/wavelet_wide.h"
 
 #include <stdlib.h>
@@ -13,7 +14,8 @@
 
 enum { WIDE = WAVELET_WIDE };
 
-_Static_assert(OPERATOR_PASS == WIDE && (int)TILED_WIDE == (int)WIDE, "a pass is as wide as its kernels");
+_Static_assert(OPERATOR_PASS == WIDE && (int)TILED_WIDE == (int)WIDE && (int)LANES == (int)WIDE,
+               "a pass is as wide as its kernels");
 
 /* piece_of [n], by position. */
 static void find_pieces(const wavelet_plan *plan, uint32_t *piece_of) {
@@ -71,20 +73,13 @@ typedef struct wide_channel {
     const float *H0[WIDE]; /* NULL: 0 */
     lam_quantity quantity[WIDE];
     float *out[WIDE];
-    double (*sums)[WIDE]; /* [n_pieces], of areas times light, or, adjoint, of lift times in */
-    float factor[WIDE];   /* of the correction of the mean error */
+    double (*sums)[WIDE];            /* [n_pieces], of areas times light, or, adjoint, of lift times in */
+    _Alignas(64) float factor[WIDE]; /* of the correction of the mean error */
 } wide_channel;
-
-/* Up to WIDE numbers of each vector that lie side by side, from `first` on, and the rows of a piece that they
- * belong to. */
-typedef struct block {
-    size_t first, count;
-    uint32_t row[WIDE];
-} block;
 
 /* Block k of a piece that begins with position `begin`. */
 static inline void find_block(const wide_channel *h, size_t piece, size_t k, size_t begin, size_t end,
-                              block *b) {
+                              lane_block *b) {
     const hierarchical *self = h->self;
     if (h->answers) {
         const hierarchical_run *run = &self->runs[self->first_run[piece] + k];
@@ -104,66 +99,53 @@ static size_t count_blocks(const wide_channel *h, size_t piece, size_t begin, si
     return h->answers ? first_run[1] - first_run[0] : (end - begin + WIDE - 1) / WIDE;
 }
 
-typedef float four __attribute__((vector_size(16), may_alias));
-
-/* to = from transposed, by squares of four. */
-static inline void transpose(const float (*from)[WIDE], float (*to)[WIDE]) {
-    for (size_t i = 0; i < WIDE; i += 4)
-        for (size_t k = 0; k < WIDE; k += 4) {
-            const four a = *(const four *)(from[i] + k), b = *(const four *)(from[i + 1] + k),
-                       c = *(const four *)(from[i + 2] + k), d = *(const four *)(from[i + 3] + k);
-            const four ab = __builtin_shufflevector(a, b, 0, 4, 1, 5),
-                       AB = __builtin_shufflevector(a, b, 2, 6, 3, 7),
-                       cd = __builtin_shufflevector(c, d, 0, 4, 1, 5),
-                       CD = __builtin_shufflevector(c, d, 2, 6, 3, 7);
-            *(four *)(to[k] + i) = __builtin_shufflevector(ab, cd, 0, 1, 4, 5);
-            *(four *)(to[k + 1] + i) = __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
-            *(four *)(to[k + 2] + i) = __builtin_shufflevector(AB, CD, 0, 1, 4, 5);
-            *(four *)(to[k + 3] + i) = __builtin_shufflevector(AB, CD, 2, 3, 6, 7);
-        }
+/* True when WIDE numbers of each vector may be read where a block begins: those behind it are of no use. */
+static inline bool is_whole(const wide_channel *h, const lane_block *b) {
+    return b->first + WIDE <= h->self->base.n;
 }
 
 /* to [count] = E + rho H0 of a vector at the elements of a block. */
-static inline void read_light(const wide_channel *h, size_t v, const block *b, float *to) {
-    const float *E = h->in[v] + b->first, *H0 = h->H0[v];
-    size_t k = 0;
-    for (; k + 4 <= b->count; k += 4) memcpy(to + k, E + k, 4 * sizeof *to);
-    for (; k < b->count; k++) to[k] = E[k];
-    if (H0 == NULL) return;
+static inline void read_light(const wide_channel *h, size_t v, const lane_block *b, float *to) {
+    const float *E = h->in[v], *H0 = h->H0[v];
     const float *rho = h->self->base.reflectance + h->c * h->self->base.n;
-    for (k = 0; k < b->count; k++) to[k] = operator_light(rho, h->in[v], H0, b->first + k);
+    for (size_t k = 0; k < b->count; k++)
+        to[k] = h->answers ? operator_light(rho, E, H0, b->first + k) : E[b->first + k];
 }
 
-/* sums_v = sum_p by_p X_pv, each in the order of mean_correction_sum. */
-static void sum_rows(const float *by, const float *X, size_t count, double *sums) {
-    enum { PARTS = 8 };
-    double parts[PARTS][WIDE] = {{0}};
+/* The sums of a vector's lift times in, which is X over `left`, are taken before X has it. */
+static void fill_adjoint(const wide_channel *h, const float *left, size_t first, size_t count, float *X,
+                         double *sums) {
+    const hierarchical *self = h->self;
+    if (self->even.missing != NULL)
+        lane_kernels_of(cpu_best())->sum(self->even.lift + h->c * self->base.n + first, X, count, sums);
     for (size_t p = 0; p < count; p++)
-        for (size_t v = 0; v < WIDE; v++) parts[p % PARTS][v] += (double)by[p] * (double)X[p * WIDE + v];
-    for (size_t v = 0; v < WIDE; v++)
-        sums[v] = ((parts[0][v] + parts[1][v]) + (parts[2][v] + parts[3][v])) +
-                  ((parts[4][v] + parts[5][v]) + (parts[6][v] + parts[7][v]));
+        for (size_t v = 0; v < WIDE; v++) X[p * WIDE + v] *= left[p];
 }
 
 /* X = right in of a piece, and its sums. */
 static void fill(void *context, size_t piece, size_t first, size_t last, float *X) {
     const wide_channel *h = context;
     const hierarchical *self = h->self;
-    const size_t n = self->base.n, count = last - first, n_blocks = count_blocks(h, piece, first, last);
-    const float *by = (h->adjoint ? self->left + h->c * n : self->root_area) + first;
-    _Alignas(64) float light[WIDE][WIDE] = {{0}}, rows[WIDE][WIDE]; /* by vector, by element */
-    block b;
+    const lane_kernels *run = lane_kernels_of(cpu_best());
+    const size_t count = last - first, n_blocks = count_blocks(h, piece, first, last);
+    const float *by = h->adjoint ? NULL : self->root_area + first;
+    float light[WIDE][WIDE] = {{0}}; /* of vectors that are not read in place */
+    const float *from[WIDE];
+    lane_block b;
     for (size_t q = 0; q < n_blocks; q++) {
         find_block(h, piece, q, first, last, &b);
-        for (size_t v = 0; v < h->count; v++) read_light(h, v, &b, light[v]);
-        transpose((const float(*)[WIDE])light, rows);
-        for (size_t k = 0; k < b.count; k++) memcpy(X + (size_t)b.row[k] * WIDE, rows[k], sizeof rows[k]);
+        const bool whole = is_whole(h, &b);
+        for (size_t v = 0; v < WIDE; v++) {
+            const bool in_place = v < h->count && whole && h->H0[v] == NULL;
+            if (v < h->count && !in_place) read_light(h, v, &b, light[v]);
+            from[v] = in_place ? h->in[v] + b.first : light[v];
+        }
+        run->put(&b, from, by, X);
     }
-    const bool corrected = self->even.missing != NULL;
-    if (corrected && h->adjoint) sum_rows(self->even.lift + h->c * n + first, X, count, h->sums[piece]);
-    for (size_t p = 0; p < count; p++)
-        for (size_t v = 0; v < WIDE; v++) X[p * WIDE + v] *= by[p];
-    if (corrected && !h->adjoint) sum_rows(by, X, count, h->sums[piece]);
+    if (h->adjoint)
+        fill_adjoint(h, self->left + h->c * self->base.n + first, first, count, X, h->sums[piece]);
+    else if (self->even.missing != NULL) /* A_j x_j = A_j^1/2 X_j */
+        run->sum(by, X, count, h->sums[piece]);
 }
 
 /* The factors of the correction, from the sums of pieces in their order. */
@@ -178,70 +160,45 @@ static void find_factors(wide_channel *h) {
     }
 }
 
-/* P of the rows of a block: left X + factor lift, or, adjoint, root X + factor area. The 0 makes -0 one 0, as
- * in a product with one vector, to which a factor of 0 adds nothing. */
-static void bounce(const wide_channel *h, const block *b, size_t first, const float *X, float (*P)[WIDE]) {
-    const hierarchical *self = h->self;
-    const size_t n = self->base.n;
-    const float *left = h->adjoint ? self->root_area : self->left + h->c * n;
-    const float *lift = self->even.missing != NULL && !h->adjoint ? self->even.lift + h->c * n : NULL;
-    for (size_t k = 0; k < b->count; k++) {
-        const size_t p = first + b->row[k];
-        const float *x = X + (size_t)b->row[k] * WIDE, by = left[p];
-        if (h->adjoint)
-            for (size_t v = 0; v < WIDE; v++) P[k][v] = by * x[v] + h->factor[v] * (by * by) + 0.0f;
-        else if (lift != NULL)
-            for (size_t v = 0; v < WIDE; v++) P[k][v] = by * x[v] + 0.0f + h->factor[v] * lift[p];
-        else
-            for (size_t v = 0; v < WIDE; v++) P[k][v] = by * x[v] + 0.0f;
-    }
-}
-
-typedef int32_t four_flags __attribute__((vector_size(16), may_alias));
-
-/* out = B = E + P, or E where nothing is reflected; four at a time, as the compiler takes no branch out of a
- * sum that might trap. */
-static inline void write_radiosity(size_t count, const float *rho, const float *E, const float *P,
-                                   float *out) {
-    size_t k = 0;
-    for (; k + 4 <= count; k += 4) {
-        four r, e, p;
-        memcpy(&r, rho + k, sizeof r);
-        memcpy(&e, E + k, sizeof e);
-        memcpy(&p, P + k, sizeof p);
-        const four_flags reflects = r > 0.0f;
-        const four sum = e + p;
-        const four_flags B = (reflects & (four_flags)sum) | (~reflects & (four_flags)e);
-        memcpy(out + k, &B, sizeof B);
-    }
-    for (; k < count; k++) out[k] = rho[k] > 0.0f ? E[k] + P[k] : E[k];
-}
-
 /* Writes P of a vector at the elements of a block, or the quantity that it gives. */
-static inline void write_out(const wide_channel *h, size_t v, const block *b, const float *P) {
+static inline void write_out(const wide_channel *h, size_t v, const lane_block *b, const float *P) {
     const float *rho = h->self->base.reflectance + h->c * h->self->base.n + b->first,
                 *E = h->in[v] + b->first, *H0 = h->H0[v] != NULL ? h->H0[v] + b->first : NULL;
     float *out = h->out[v] + b->first;
-    if (!h->answers)
-        memcpy(out, P, b->count * sizeof *out);
-    else if (H0 == NULL && h->quantity[v] == LAM_RADIOSITY) /* most answers */
-        write_radiosity(b->count, rho, E, P, out);
-    else
-        for (size_t k = 0; k < b->count; k++)
-            out[k] = operator_finish(h->quantity[v], rho[k], operator_light(rho, E, H0, k), P[k],
-                                     H0 != NULL ? H0[k] : 0.0f);
+    for (size_t k = 0; k < b->count; k++)
+        out[k] = h->answers ? operator_finish(h->quantity[v], rho[k], operator_light(rho, E, H0, k), P[k],
+                                              H0 != NULL ? H0[k] : 0.0f)
+                            : P[k];
+}
+
+/* True when all answers are radiosities of emissions alone, as most are. */
+static bool is_plain(const wide_channel *h) {
+    bool plain = h->answers;
+    for (size_t v = 0; v < h->count; v++)
+        plain = plain && h->H0[v] == NULL && h->quantity[v] == LAM_RADIOSITY;
+    return plain;
 }
 
 static void use(void *context, size_t piece, size_t first, size_t last, float *X) {
     const wide_channel *h = context;
-    const size_t n_blocks = count_blocks(h, piece, first, last);
-    _Alignas(64) float rows[WIDE][WIDE] = {{0}}, P[WIDE][WIDE]; /* by element, by vector */
-    block b;
+    const hierarchical *self = h->self;
+    const lane_kernels *run = lane_kernels_of(cpu_best());
+    const size_t n_blocks = count_blocks(h, piece, first, last), at = h->c * self->base.n + first;
+    const bool lifted = self->even.missing != NULL && !h->adjoint, plain = is_plain(h);
+    const float *rho = self->base.reflectance + h->c * self->base.n;
+    const lane_bounce bounce = {.adjoint = h->adjoint,
+                                .left = h->adjoint ? self->root_area + first : self->left + at,
+                                .lift = lifted ? self->even.lift + at : NULL,
+                                .factor = h->factor};
+    _Alignas(64) float P[WIDE][WIDE]; /* by vector, by element */
+    lane_block b;
     for (size_t q = 0; q < n_blocks; q++) {
         find_block(h, piece, q, first, last, &b);
-        bounce(h, &b, first, X, rows);
-        transpose((const float(*)[WIDE])rows, P);
-        for (size_t v = 0; v < h->count; v++) write_out(h, v, &b, P[v]);
+        run->take(&bounce, &b, X, P);
+        if (plain && is_whole(h, &b))
+            run->radiosity(&b, h->count, rho, h->in, (const float(*)[WIDE])P, h->out);
+        else
+            for (size_t v = 0; v < h->count; v++) write_out(h, v, &b, P[v]);
     }
 }
 
