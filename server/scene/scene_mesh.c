@@ -229,7 +229,7 @@ static void drop_changed(const scene *of, scene_pictures *pictures) {
 typedef struct mesh_corners {
     corner_arrays arrays;
     corner_nodes nodes;
-    corner_rows rows;
+    corner_matrix matrix;
     gltf_corners of;
 } mesh_corners;
 
@@ -246,8 +246,8 @@ static lam_status find_corners(store *s, const scene *root, mesh_form form, mesh
     c->of = (gltf_corners){.nodes = &c->nodes, .shared = form == MESH_CORNERS};
     if (form == MESH_ELEMENTS_CORNERS) {
         TRY(scene_corners_get(root->corners, &plan, error));
-        TRY(corner_plan_expand(plan, times(root->n, WEIGHTS_OF_ELEMENT), &c->rows, error));
-        c->of.rows = &c->rows;
+        TRY(corner_plan_expand(plan, times(root->n, WEIGHTS_OF_ELEMENT), &c->matrix, error));
+        c->of.matrix = &c->matrix;
     }
 done:
     return status;
@@ -256,7 +256,7 @@ done:
 static void mesh_corners_free(mesh_corners *c) {
     corner_arrays_free(&c->arrays);
     corner_nodes_free(&c->nodes);
-    corner_rows_free(&c->rows);
+    corner_matrix_free(&c->matrix);
 }
 
 lam_status scene_mesh_build(const scene_mesh *mesh, mesh_form form, buffer *out, lam_error *error) {

@@ -129,7 +129,7 @@ static lam_status plan_views(gltf_writer *w, lam_error *error) {
     }
     if (m->corners != NULL) {
         w->map_view = w->n_views++;
-        w->n_blobs = m->corners->rows != NULL ? 3 : 0;
+        w->n_blobs = m->corners->matrix != NULL ? 4 : 0;
     }
     w->view = memory_allocate(w->n_views + w->n_images + w->n_blobs + 1, sizeof *w->view, "glTF", error);
     if (w->view == NULL) return LAM_ERR_MEMORY;
@@ -198,8 +198,9 @@ static bool say_extras(const gltf_writer *w, buffer *b) {
     if (w->m->corners != NULL)
         good = good && buffer_printf(b, ",\"corners\":{\"count\":%zu", w->m->corners->nodes->n_nodes) &&
                (w->n_blobs == 0 ||
-                buffer_printf(b, ",\"first\":%zu,\"elements\":%zu,\"weights\":%zu", w->n_views + w->n_images,
-                              w->n_views + w->n_images + 1, w->n_views + w->n_images + 2)) &&
+                buffer_printf(b, ",\"parts\":%zu,\"first\":%zu,\"elements\":%zu,\"weights\":%zu",
+                              w->n_views + w->n_images, w->n_views + w->n_images + 1,
+                              w->n_views + w->n_images + 2, w->n_views + w->n_images + 3)) &&
                buffer_append_text(b, "}");
     if (w->m->kind != NULL)
         good = good && buffer_append_text(b, ",\"kind\":") && json_write_text(b, w->m->kind);

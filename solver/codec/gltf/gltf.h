@@ -7,7 +7,7 @@
 #include "solver/base/scene/scene_pictures.h"
 #include "solver/codec/buffer.h"
 #include "solver/operator/corners/corner_nodes.h"
-#include "solver/operator/corners/corner_rows.h"
+#include "solver/operator/corners/corner_plan.h"
 #include "solver/operator/groups/groups.h"
 
 /* More elements have numbers that a float does not hold. */
@@ -43,9 +43,9 @@ typedef struct gltf_lightmap {
 
 /* Corners that elements share, of which elements have polygons with those inside their edges. */
 typedef struct gltf_corners {
-    const corner_nodes *nodes; /* of the mesh, whose numbers ascend by group */
-    bool shared;               /* a vertex is a corner; else elements have vertices of their own */
-    const corner_rows *rows;   /* the weights of corners over elements; or NULL */
+    const corner_nodes *nodes;   /* of the mesh, whose numbers ascend by group */
+    bool shared;                 /* a vertex is a corner; else elements have vertices of their own */
+    const corner_matrix *matrix; /* the weights of corners over elements; or NULL */
 } gltf_corners;
 
 /* A scene as it is stored (store/FORMAT.md, /mesh). Every index is below its bound, every number finite. */
@@ -83,9 +83,10 @@ typedef struct gltf_mesh {
  *     blended (gltf_surface.h), and shows no image.
  *   - With corners vertices have _CORNER, the number of the corner, and elements are polygons of all corners
  * on their edges. Shared ones ascend over all groups, vertex v of the file being corner v; _ELEMENT, _FACE
- * and NORMAL are those of the first element that has it. With rows extras say "corners": {"count", "first",
- *     "elements", "weights"}, the last three numbers of views: corner j is the sum of weights[k] times the
- * light of elements[k] (u32) for k from first[j] (u32, [count + 1]) to first[j + 1] - 1.
+ * and NORMAL are those of the first element that has it. With a matrix extras say "corners": {"count",
+ * "parts", "first", "elements", "weights"}, the last four numbers of views: corner j is the sum of parts p
+ * from parts[j] (u32, [count + 1]) to parts[j + 1] - 1, each of weights[k] times the light of elements[k]
+ * (u32) for k from first[p] (u32) to first[p + 1] - 1, put to its bound (corner_plan.h).
  *   - With light each column is one more attribute (a float), and COLOR_0 its colour, cut to [0, 1].
  * Materials are then white and unlit (KHR_materials_unlit), and extras say "white".
  *   - A group whose elements all have one image (pictures) has TEXCOORD_0, _REFLECTANCE (three floats, that
@@ -107,7 +108,7 @@ typedef struct gltf_sizes {
     size_t n, n_vertices, n_groups, n_texts;
     size_t n_buried;                /* elements */
     bool corners;                   /* gltf_corners */
-    size_t n_inside, n_weights;     /* corners inside edges, and entries of rows, at most; 0: none */
+    size_t n_inside, n_weights;     /* corners inside edges, and weights of corners, at most; 0: none */
     size_t n_textured;              /* elements that may have an image: n or 0 */
     size_t n_textures, image_bytes; /* surfaces and images together */
 } gltf_sizes;

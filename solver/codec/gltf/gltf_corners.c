@@ -155,17 +155,21 @@ done:
     return status;
 }
 
-/* First, columns, weights. */
+/* Parts, first, columns, weights. */
 size_t gltf_blob_bytes(const gltf_writer *w, size_t k) {
-    const corner_rows *rows = w->m->corners->rows;
-    return sizeof(uint32_t) * (k == 0 ? rows->n_rows + 1 : rows->first[rows->n_rows]);
+    const corner_matrix *m = w->m->corners->matrix;
+    return sizeof(uint32_t) * (k == 0   ? m->n_nodes + 1
+                               : k == 1 ? m->rows.n_rows + 1
+                                        : m->rows.first[m->rows.n_rows]);
 }
 
 void gltf_put_blobs(const gltf_writer *w, char *to) {
     if (w->n_blobs == 0) return;
-    const corner_rows *rows = w->m->corners->rows;
+    const corner_matrix *m = w->m->corners->matrix;
+    const corner_rows *rows = &m->rows;
     const size_t *view = w->view + w->n_views + w->n_images, count = rows->first[rows->n_rows];
-    char *first = to + view[0], *columns = to + view[1], *weights = to + view[2];
+    char *parts = to + view[0], *first = to + view[1], *columns = to + view[2], *weights = to + view[3];
+    for (size_t j = 0; j <= m->n_nodes; j++) parts = gltf_put(parts, m->parts[j]);
     for (size_t j = 0; j <= rows->n_rows; j++) first = gltf_put(first, rows->first[j]);
     for (size_t k = 0; k < count; k++) {
         columns = gltf_put(columns, rows->columns[k]);

@@ -18,20 +18,22 @@ static size_t sum_of_products(size_t n, const size_t (*terms)[2]) {
 
 size_t gltf_bytes_most(const gltf_sizes *sizes) {
     const size_t element = 4 * 8 * sizeof(float) + 6 * sizeof(uint32_t);
-    /* A vertex has its number, and the first of its weights; one inside an edge is one more. */
+    /* A vertex has its number, and the first of its parts; one inside an edge is one more. */
     const size_t numbers = sizes->corners ? 4 * 2 * sizeof(float) : 0,
                  inside = 15 * sizeof(float) + 6 * sizeof(uint32_t);
-    return sum_of_products(11, (const size_t[][2]){{sizes->n, element},
-                                                   {sizes->n, numbers},
-                                                   {sizes->n_inside, inside},
-                                                   {sizes->n_weights, 2 * sizeof(float)},
-                                                   {sizes->n_buried, JSON_OF_NUMBER},
-                                                   {sizes->n_textured, 4 * 5 * sizeof(float)},
-                                                   {sizes->n_textures, JSON_OF_GROUP},
-                                                   {sizes->image_bytes, 1},
-                                                   {sizes->n_texts, JSON_OF_NAME},
-                                                   {sizes->n_groups, JSON_OF_GROUP},
-                                                   {JSON_OF_FILE, 1}});
+    return sum_of_products(
+        11,
+        (const size_t[][2]){{sizes->n, element},
+                            {sizes->n, numbers},
+                            {sizes->n_inside, inside},
+                            {sizes->n_weights, 2 * sizeof(float) + sizeof(uint32_t) / CORNER_WEIGHTS_OF_PART},
+                            {sizes->n_buried, JSON_OF_NUMBER},
+                            {sizes->n_textured, 4 * 5 * sizeof(float)},
+                            {sizes->n_textures, JSON_OF_GROUP},
+                            {sizes->image_bytes, 1},
+                            {sizes->n_texts, JSON_OF_NAME},
+                            {sizes->n_groups, JSON_OF_GROUP},
+                            {JSON_OF_FILE, 1}});
 }
 
 size_t gltf_work_bytes(const gltf_sizes *sizes) {

@@ -1,4 +1,4 @@
-/* The matrix of a plan as a whole, v = S (2 x - N S x): the rows of its parts, multiplied. */
+/* The matrix of a plan as a whole, v = S (2 x - N S x): the rows of its factors, multiplied. */
 #include "solver/base/array_grow.h"
 #include "solver/operator/corners/corner_plan.h"
 
@@ -69,12 +69,13 @@ static int compare_numbers(const void *left, const void *right) {
     return (a > b) - (a < b);
 }
 
-static lam_status add_row(expansion *e, uint32_t node, corner_rows *out, lam_error *error) {
+/* Adds factor times the row of a free node. */
+static lam_status add_row(expansion *e, uint32_t node, double factor, corner_rows *out, lam_error *error) {
     const corner_rows *means = &e->plan->means;
     size_t count = 0;
     sums_clear(&e->inner);
     sums_clear(&e->whole);
-    add_node(e, node, 1, &e->inner);
+    add_node(e, node, factor, &e->inner);
     for (size_t k = 0; k < e->inner.n_touched; k++) {
         const uint32_t i = e->inner.touched[k];
         const double weight = e->inner.of[i];
@@ -92,10 +93,33 @@ static lam_status add_row(expansion *e, uint32_t node, corner_rows *out, lam_err
     return corner_rows_add(out, count, e->columns, e->weights, error);
 }
 
-lam_status corner_plan_expand(const corner_plan *plan, size_t most, corner_rows *out, lam_error *error) {
+/* The parts of a node: of one inside an edge those of the ends, each of which has a bound of its own. */
+static lam_status add_parts(expansion *e, uint32_t node, double factor, size_t most, corner_rows *out,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    if (e->link[node] > 0) {
+        const corner_link *link = &e->plan->links[e->link[node] - 1];
+        TRY(add_parts(e, link->a, factor * (1 - (double)link->t), most, out, error));
+        TRY(add_parts(e, link->b, factor * (double)link->t, most, out, error));
+        return status;
+    }
+    TRY(add_row(e, node, factor, out, error));
+    if (out->first[out->n_rows] > most)
+        FAIL(error, LAM_ERR_ARGUMENT, "corners have more than %zu weights", most);
+done:
+    return status;
+}
+
+static size_t parts_of(const expansion *e, uint32_t node) {
+    if (e->link[node] == 0) return 1;
+    const corner_link *link = &e->plan->links[e->link[node] - 1];
+    return parts_of(e, link->a) + parts_of(e, link->b);
+}
+
+lam_status corner_plan_expand(const corner_plan *plan, size_t most, corner_matrix *out, lam_error *error) {
     lam_status status = LAM_OK;
     expansion e = {.plan = plan};
-    corner_rows made = {.n_rows = 0};
+    corner_matrix made = {.n_nodes = plan->n_nodes};
     e.link = memory_allocate(plan->n_nodes, sizeof *e.link, "corners", error);
     e.columns = memory_allocate(plan->n, sizeof *e.columns, "corners", error);
     e.weights = memory_allocate(plan->n, sizeof *e.weights, "corners", error);
@@ -103,21 +127,31 @@ lam_status corner_plan_expand(const corner_plan *plan, size_t most, corner_rows 
     TRY(sums_create(&e.inner, plan->n, error));
     TRY(sums_create(&e.whole, plan->n, error));
     for (size_t k = 0; k < plan->n_links; k++) e.link[plan->links[k].node] = (uint32_t)k + 1;
-    TRY(corner_rows_begin(&made, plan->n_nodes, error));
+    made.parts = memory_allocate(plan->n_nodes + 1, sizeof *made.parts, "corners", error);
+    if (made.parts == NULL) TRY(LAM_ERR_MEMORY);
     for (uint32_t j = 0; j < plan->n_nodes; j++) {
-        TRY(add_row(&e, j, &made, error));
-        if (made.first[j + 1] > most)
-            FAIL(error, LAM_ERR_ARGUMENT, "corners have more than %zu weights", most);
+        const size_t end = made.parts[j] + parts_of(&e, j);
+        if (end > most / CORNER_WEIGHTS_OF_PART)
+            FAIL(error, LAM_ERR_ARGUMENT, "corners have more than %zu parts", most / CORNER_WEIGHTS_OF_PART);
+        made.parts[j + 1] = (uint32_t)end;
     }
-    TRY(corner_rows_end(&made, error));
+    TRY(corner_rows_begin(&made.rows, made.parts[plan->n_nodes], error));
+    for (uint32_t j = 0; j < plan->n_nodes; j++) TRY(add_parts(&e, j, 1, most, &made.rows, error));
+    TRY(corner_rows_end(&made.rows, error));
     *out = made;
-    made = (corner_rows){.n_rows = 0};
+    made = (corner_matrix){.n_nodes = 0};
 done:
-    corner_rows_free(&made);
+    corner_matrix_free(&made);
     sums_free(&e.inner);
     sums_free(&e.whole);
     free(e.link);
     free(e.columns);
     free(e.weights);
     return status;
+}
+
+void corner_matrix_free(corner_matrix *matrix) {
+    corner_rows_free(&matrix->rows);
+    free(matrix->parts);
+    *matrix = (corner_matrix){.n_nodes = 0};
 }

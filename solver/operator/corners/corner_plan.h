@@ -41,8 +41,19 @@ void corner_plan_apply(const corner_plan *plan, size_t n_rows, float *x, float *
  * [n + n_nodes] is lost. */
 void corner_plan_transpose(const corner_plan *plan, size_t n_rows, float *g, float *w, float *work);
 
-/* The matrix as a whole, rows of all nodes, freed by corner_rows_free; weights below 1e-6 are left out.
- * Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT (more than `most` weights). */
-lam_status corner_plan_expand(const corner_plan *plan, size_t most, corner_rows *out, lam_error *error);
+/* The matrix as a whole: node j is the sum of rows parts[j] ... parts[j + 1] - 1, each of which is put to its
+ * bound first: 0, or the least number times the sum of its weights. A node inside an edge has several, those
+ * of the ends. */
+typedef struct corner_matrix {
+    size_t n_nodes;
+    uint32_t *parts; /* [n_nodes + 1], below 2^32 */
+    corner_rows rows;
+} corner_matrix;
+
+/* Freed by corner_matrix_free; weights below 1e-6 are left out. Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT
+ * (more than `most` weights, or a part for more than every CORNER_WEIGHTS_OF_PART of these). */
+#define CORNER_WEIGHTS_OF_PART 4
+lam_status corner_plan_expand(const corner_plan *plan, size_t most, corner_matrix *out, lam_error *error);
+void corner_matrix_free(corner_matrix *matrix);
 
 #endif

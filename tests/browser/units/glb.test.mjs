@@ -31,7 +31,7 @@ function squares(groups, lambert = {}) {
     }
     // No corner is shared: each has the light of its element.
     const view = (values) => gltf.accessors[put(values, "SCALAR", 1)].bufferView, corners = Array.from({ length: 4 * element }, (_, k) => k);
-    lambert.corners = { count: corners.length, first: view(Uint32Array.from([...corners, corners.length])),
+    lambert.corners = { count: corners.length, parts: view(Uint32Array.from([...corners, corners.length])), first: view(Uint32Array.from([...corners, corners.length])),
         elements: view(Uint32Array.from(corners, (k) => k >> 2)), weights: view(Float32Array.from(corners, () => 1)) };
     let text = JSON.stringify(gltf);
     text += " ".repeat((4 - text.length % 4) % 4);

@@ -262,7 +262,25 @@ START_TEST(chains_have_an_end) {
 }
 END_TEST
 
-/* <g, S x> = <S^T g, x>, and the matrix as a whole is the product: light is far above 0, so that no bound
+/* The values of the matrix, whose parts have a bound at 0 each. */
+static void check_matrix(const corner_matrix *m, size_t n, size_t n_nodes, const float *x, const float *out,
+                         double tolerance) {
+    ck_assert_uint_eq(m->n_nodes, n_nodes);
+    for (size_t j = 0; j < n_nodes; j++) {
+        double value = 0;
+        for (uint32_t p = m->parts[j]; p < m->parts[j + 1]; p++) {
+            double sum = 0;
+            for (uint32_t k = m->rows.first[p]; k < m->rows.first[p + 1]; k++) {
+                ck_assert_uint_lt(m->rows.columns[k], n);
+                sum += (double)m->rows.weights[k] * (double)x[m->rows.columns[k]];
+            }
+            value += fmax(sum, 0);
+        }
+        ck_assert_double_eq_tol(value, (double)out[j], tolerance);
+    }
+}
+
+/* <g, S x> = <S^T g, x>, and the matrix as a whole is the product: where light is far above 0 no bound
  * acts. */
 START_TEST(transpose_and_matrix_agree) {
     patchwork p = {.m = {.n = 0}};
@@ -271,7 +289,7 @@ START_TEST(transpose_and_matrix_agree) {
     const size_t n = p.m.n, n_nodes = s.plan.n_nodes;
     float x[MOST], out[4 * MOST], g[4 * MOST] = {0}, lost[4 * MOST], w[MOST] = {0}, work[5 * MOST];
     lam_error error = {.message = ""};
-    corner_rows whole = {.n_rows = 0};
+    corner_matrix whole = {.n_nodes = 0};
     for (size_t i = 0; i < n; i++) x[i] = 100 + (float)((i * 7) % 5);
     for (size_t j = 0; j < n_nodes; j++) g[j] = (float)((j * 5) % 7) - 3;
     apply(&s, x, out);
@@ -282,14 +300,18 @@ START_TEST(transpose_and_matrix_agree) {
     for (size_t i = 0; i < n; i++) right += (double)w[i] * (double)x[i];
     ck_assert_double_eq_tol(left, right, 1e-2); /* of sums of some 1e4 */
     ck_ok(corner_plan_expand(&s.plan, 1000000, &whole, &error));
-    ck_assert_uint_eq(whole.n_rows, n_nodes);
-    for (size_t j = 0; j < n_nodes; j++) {
-        double sum = 0;
-        for (uint32_t k = whole.first[j]; k < whole.first[j + 1]; k++)
-            sum += (double)whole.weights[k] * (double)x[whole.columns[k]];
-        ck_assert_double_eq_tol(sum, (double)out[j], 1e-3);
+    check_matrix(&whole, n, n_nodes, x, out, 1e-3);
+    /* Darkness beside much light: bounds act, also at one end of an edge that corners hang in. */
+    size_t bound = 0;
+    for (size_t lit = 0; lit < n; lit++) {
+        for (size_t i = 0; i < n; i++) x[i] = i == lit ? 100 : 0;
+        apply(&s, x, out);
+        for (size_t k = 0; k < s.plan.n_links; k++)
+            bound += (out[s.plan.links[k].a] > 0) != (out[s.plan.links[k].b] > 0);
+        check_matrix(&whole, n, n_nodes, x, out, 1e-3);
     }
-    corner_rows_free(&whole);
+    ck_assert_uint_gt(bound, 0);
+    corner_matrix_free(&whole);
     made_free(&s);
 }
 END_TEST

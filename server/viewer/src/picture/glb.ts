@@ -49,10 +49,11 @@ export interface MeshImage {
     wrap: [number, number];
 }
 
-/** Corners that elements share, at which smooth light is the sum of weights[k] times that of elements[k] for k from
- * first[i] to first[i + 1] − 1. */
+/** Corners that elements share, at which smooth light is the sum of parts p from parts[i] to parts[i + 1] − 1, each of
+ * weights[k] times that of elements[k] for k from first[p] to first[p + 1] − 1, or 0 where that is below 0. */
 export interface MeshCorners {
     count: number;
+    parts: Uint32Array;
     first: Uint32Array;
     elements: Uint32Array;
     weights: Float32Array;
@@ -109,7 +110,7 @@ interface Gltf {
         lambert?: {
             up?: string;
             glass_law?: string;
-            corners?: { count: number; first: number; elements: number; weights: number };
+            corners?: { count: number; parts: number; first: number; elements: number; weights: number };
         };
     };
 }
@@ -235,8 +236,9 @@ function cornersOf(gltf: Gltf, file: ArrayBuffer, start: number): MeshCorners {
         const { byteOffset, byteLength } = gltf.bufferViews[view];
         return [file, start + (byteOffset ?? 0), byteLength / 4];
     };
-    return { count: about.count, first: new Uint32Array(...part(about.first)),
-        elements: new Uint32Array(...part(about.elements)), weights: new Float32Array(...part(about.weights)) };
+    return { count: about.count, parts: new Uint32Array(...part(about.parts)),
+        first: new Uint32Array(...part(about.first)), elements: new Uint32Array(...part(about.elements)),
+        weights: new Float32Array(...part(about.weights)) };
 }
 
 type Primitive = Gltf["meshes"][number]["primitives"][number];

@@ -35,13 +35,14 @@ vec3 element_colour(highp sampler2D values, int i) {
 }
 `;
 
-/** Fills the texture of nodes: each is the sum of elements by weights, nowhere below 0 and the least of them. */
+/** Fills the texture of nodes: each is the sum of its parts, and each of these the sum of elements by weights, nowhere
+ * below 0 and its share of the least of them. */
 const nodesFragment = `
 precision highp float;
 precision highp int;
 precision highp usampler2D;
 ${fetchElement}
-uniform usampler2D node_first, node_elements;
+uniform usampler2D node_parts, node_first, node_elements;
 uniform highp sampler2D node_weights;
 uniform int node_count;
 layout(location = 0) out vec4 sum_a;
@@ -53,22 +54,28 @@ uint entry(usampler2D list, int i) {
 }
 
 void main() {
-    int width = textureSize(node_first, 0).x;
+    int width = textureSize(node_parts, 0).x;
     int node = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
     if (node >= node_count) discard;
-    int first = int(entry(node_first, node)), end = int(entry(node_first, node + 1));
-    vec3 a = vec3(0.0), b = vec3(0.0), least_a = vec3(0.0), least_b = vec3(0.0);
-    for (int k = first; k < end; k++) {
-        int element = int(entry(node_elements, k));
-        float weight = texel(node_weights, k);
-        vec3 own_a = element_colour(values_a, element), own_b = element_colour(values_b, element);
-        a += weight * own_a;
-        b += weight * own_b;
-        least_a = min(least_a, own_a);
-        least_b = min(least_b, own_b);
+    int part = int(entry(node_parts, node)), last = int(entry(node_parts, node + 1));
+    sum_a = sum_b = vec4(0.0, 0.0, 0.0, 1.0);
+    for (; part < last; part++) {
+        int first = int(entry(node_first, part)), end = int(entry(node_first, part + 1));
+        vec3 a = vec3(0.0), b = vec3(0.0), least_a = vec3(0.0), least_b = vec3(0.0);
+        float share = 0.0;
+        for (int k = first; k < end; k++) {
+            int element = int(entry(node_elements, k));
+            float weight = texel(node_weights, k);
+            vec3 own_a = element_colour(values_a, element), own_b = element_colour(values_b, element);
+            a += weight * own_a;
+            b += weight * own_b;
+            share += weight;
+            least_a = min(least_a, own_a);
+            least_b = min(least_b, own_b);
+        }
+        sum_a.rgb += max(a, share * least_a);
+        sum_b.rgb += max(b, share * least_b);
     }
-    sum_a = vec4(max(a, least_a), 1.0);
-    sum_b = vec4(max(b, least_b), 1.0);
 }
 `;
 
@@ -266,6 +273,7 @@ export function makeUniforms(nothing: Texture): Uniforms {
         nodes_a: of(nothing),
         nodes_b: of(nothing),
         judged: of(nothing),
+        node_parts: of(null),
         node_first: of(null),
         node_elements: of(null),
         node_weights: of(nothing),

@@ -146,6 +146,7 @@ export class Stage {
         const u = this.uniforms;
         u.values_a.value = this.values[0].texture;
         u.values_b.value = this.values[1].texture;
+        u.node_parts.value = integerTexture(nodes.parts);
         u.node_first.value = integerTexture(nodes.first);
         u.node_elements.value = integerTexture(nodes.elements);
         u.node_weights.value = floatTexture(nodes.weights);
@@ -453,7 +454,7 @@ export class Stage {
         this.sunlight?.dispose();
         this.sunlight = null;
         this.uniforms.is_sunny.value = false;
-        for (const name of ["node_first", "node_elements", "node_weights", "judged", "reflectance"])
+        for (const name of ["node_parts", "node_first", "node_elements", "node_weights", "judged", "reflectance"])
             (this.uniforms[name].value as { dispose?: () => void } | null)?.dispose?.();
         this.uniforms.reflectance.value = this.nothing;
         this.geometry =
