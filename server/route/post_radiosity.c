@@ -118,7 +118,6 @@ static bool find_gathered(const call *in, radiosity_solve *s, problem *why) {
  * scratch for the figures. */
 static bool find_room(call *in, radiosity_solve *s, problem *why) {
     const reduce_request *reduce = &s->request.reduce;
-    const size_t most = answer_bytes_most(&s->shape, &in->accept);
     if (reduce->on) {
         if (!request_memory_take(in->memory, figures_bytes(in->scene, &s->request), why)) return false;
         const bool allocated = figures_allocate(in->scene, &s->request, &s->figures);
@@ -131,15 +130,16 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
                (allocated || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors",
                                          s->shape.n_rhs));
     }
-    const bool placed =
-        in->accept.type == MEDIA_NPY && in->accept.npy == NPY_F4 && !s->request.told.luminance;
+    const size_t whole = s->request.told.luminance ? 0 : answer_placed_bytes(&s->shape, &in->accept);
+    const bool placed = whole > 0;
+    const size_t most = placed ? whole : answer_bytes_most(&s->shape, &in->accept);
     s->streams = !placed && most > ANSWER_WHOLE;
     if (!s->streams && (!request_memory_take(in->memory, most, why) ||
                         !(buffer_reserve(&s->answer, most) ||
                           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer"))))
         return false;
     if (!answer_begin(&s->answer, &s->shape, &in->accept, &s->notes, why)) return false;
-    float *values = placed ? answer_place(&s->answer, &s->shape, &in->accept) : NULL;
+    float *values = placed ? answer_place(&s->answer, &s->shape) : NULL;
     const bool inside = values != NULL;
     if (!inside) values = allocate_rows(in, s, s->shape.n_values, "values", why);
     if (values == NULL) return false;
@@ -463,7 +463,7 @@ static bool write_answer(call *in, radiosity_solve *s) {
     if (good && s->request.told.luminance) answer_luminance(s->shape.n_rhs, s->shape.n_values, s->own);
     if (s->streams) return good && make_stream(in, s);
     good = good && (s->own == NULL
-                        ? answer_placed(&s->answer, &s->shape, &s->why)
+                        ? answer_placed(&s->answer, &s->shape, &in->accept, &s->why)
                         : answer_add(&s->answer, &s->shape, &in->accept, 0, s->shape.n_rhs, s->own, &s->why));
     s->notes.encode_ms = clock_ms() - start;
     return good && answer_end(&s->answer, &s->shape, &in->accept, &s->notes, &s->why);

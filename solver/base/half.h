@@ -1,7 +1,8 @@
-/* IEEE half precision (f16) in software: bit for bit what the instructions of the processor give. */
+/* IEEE half precision (f16); in software bit for bit what the instructions of the processor give. */
 #ifndef LAMBERT_BASE_HALF_H
 #define LAMBERT_BASE_HALF_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -38,5 +39,9 @@ static inline float float_of_half(uint16_t half) {
     /* The exponent is 112 too small for a float; the multiplication also normalizes subnormal numbers. */
     return float_of_bits(sign | float_bits(float_of_bits(magnitude << 13) * 0x1p112f));
 }
+
+/* The nearest f16 of each of count floats, [count] numbers of 2 bytes to any address, also to that of x
+ * itself; by instructions where there are some, which keep more of a NaN. */
+void halves_of_floats(const float *x, size_t count, void *halves);
 
 #endif

@@ -1,6 +1,7 @@
 #include "solver/codec/answer.h"
 
 #include "solver/base/half.h"
+#include "solver/codec/answer_stream.h"
 #include "solver/codec/json_writer.h"
 #include "solver/codec/npy.h"
 #include "solver/codec/request.h"
@@ -194,19 +195,26 @@ static size_t count_values(const answer_shape *shape) {
                : SIZE_MAX;
 }
 
-float *answer_place(buffer *b, const answer_shape *shape, const media_accept *as) {
+size_t answer_placed_bytes(const answer_shape *shape, const media_accept *as) {
+    media_accept floats = *as;
+    if (as->type != MEDIA_NPY || as->npy == NPY_F8) return 0;
+    floats.npy = NPY_F4;
+    return answer_bytes_most(shape, &floats);
+}
+
+float *answer_place(buffer *b, const answer_shape *shape) {
     size_t bytes;
-    if (as->type != MEDIA_NPY || as->npy != NPY_F4 ||
-        !size_multiply(count_values(shape), sizeof(float), &bytes) || !buffer_reserve(b, bytes))
-        return NULL;
+    if (!size_multiply(count_values(shape), sizeof(float), &bytes) || !buffer_reserve(b, bytes)) return NULL;
     return (float *)(void *)(b->bytes + b->length);
 }
 
-bool answer_placed(buffer *b, const answer_shape *shape, problem *why) {
+bool answer_placed(buffer *b, const answer_shape *shape, const media_accept *as, problem *why) {
     const size_t count = count_values(shape);
-    const float *x = (const float *)(const void *)(b->bytes + b->length);
-    if (!check_range(x, count, shape->gaps, FLT_MAX, why)) return false;
-    b->length += count * sizeof(float);
+    char *const to = b->bytes + b->length;
+    const float *x = (const float *)(const void *)to;
+    if (!answer_check_as(x, count, shape->gaps, as, why)) return false;
+    if (as->npy == NPY_F2) npy_convert(NPY_F2, x, count, to);
+    b->length += count * npy_size(as->npy);
     b->bytes[b->length] = '\0';
     return true;
 }

@@ -82,10 +82,13 @@ bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n,
  * its end. False with *why: 422 when a value is beyond what the encoding holds, 503 when memory is short. */
 bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                   problem *why);
-/* Room behind answer_begin's bytes for the values of a whole answer, [n_rhs][C][n_values]; answer_placed, in
- * place of answer_add, then takes them. NULL where the encoding is not <f4, or memory is short. */
-float *answer_place(buffer *b, const answer_shape *shape, const media_accept *as);
-bool answer_placed(buffer *b, const answer_shape *shape, problem *why);
+/* The memory of an answer whose values are computed where they are sent from, as floats that answer_placed
+ * makes halves of where these are asked for; 0 where the encoding has no place for floats. */
+size_t answer_placed_bytes(const answer_shape *shape, const media_accept *as);
+/* Room behind answer_begin's bytes for the values of such an answer, [n_rhs][C][n_values]; answer_placed, in
+ * place of answer_add, then takes them. NULL where memory is short. */
+float *answer_place(buffer *b, const answer_shape *shape);
+bool answer_placed(buffer *b, const answer_shape *shape, const media_accept *as, problem *why);
 
 bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
                 const float *x, problem *why);

@@ -1,7 +1,7 @@
 #include "solver/codec/answer_stream.h"
 
-#include "solver/base/half.h"
 #include "solver/codec/json_writer.h"
+#include "solver/codec/npy.h"
 #include "store/status.h"
 
 #include <float.h>
@@ -26,10 +26,6 @@ struct answer_stream {
     size_t k, c; /* its element and channel */
 };
 
-static size_t size_of(npy_type type) {
-    return type == NPY_F2 ? 2 : type == NPY_F4 ? 4 : 8;
-}
-
 static size_t count_of(const answer_shape *shape) {
     size_t count;
     return size_multiply(shape->n_rhs, shape->n_channels, &count) &&
@@ -39,7 +35,7 @@ static size_t count_of(const answer_shape *shape) {
 }
 
 size_t answer_bytes_most(const answer_shape *shape, const media_accept *as) {
-    const size_t each = as->type == MEDIA_NPY ? size_of(as->npy) : JSON_FLOAT_MAX + 1;
+    const size_t each = as->type == MEDIA_NPY ? npy_size(as->npy) : JSON_FLOAT_MAX + 1;
     size_t bytes, rows, all;
     /* Arrays of this many numbers are written in pieces, which take room of their own before they are joined.
      */
@@ -84,18 +80,10 @@ static size_t read_buffer(const buffer *b, size_t *sent, char *to, size_t room) 
 }
 
 static size_t read_npy(answer_stream *s, char *to, size_t room) {
-    const size_t each = size_of(s->as.npy), left = s->count - s->next;
+    const size_t each = npy_size(s->as.npy), left = s->count - s->next;
     const size_t count = left < room / each ? left : room / each;
     const float *x = s->x + s->next;
-    for (size_t i = 0; i < count; i++) {
-        const double wide = (double)x[i];
-        const uint16_t half = half_of_float(x[i]);
-        memcpy(to + i * each,
-               s->as.npy == NPY_F2   ? (const void *)&half
-               : s->as.npy == NPY_F8 ? (const void *)&wide
-                                     : &x[i],
-               each);
-    }
+    npy_convert(s->as.npy, x, count, to);
     s->next += count;
     return count * each;
 }
@@ -127,11 +115,7 @@ static size_t read_json(answer_stream *s, char *to, size_t room) {
             at = before_row(s, at);
         else
             *at++ = ',';
-        for (size_t i = 0; i < count; i++) {
-            at += json_write_float(at, s->x[s->next + i]);
-            *at++ = ',';
-        }
-        at--; /* the last comma */
+        at = json_write_numbers(at, s->x + s->next, count) - 1; /* without the last comma */
         s->next += count;
         s->k += count;
         if (s->k == s->shape.n_values) at = behind_row(s, at);
@@ -163,7 +147,7 @@ uint64_t answer_stream_most(const answer_stream *s) {
 
 uint64_t answer_stream_length(const answer_stream *s) {
     if (s->as.type != MEDIA_NPY) return UINT64_MAX;
-    return s->head.length + (uint64_t)s->count * size_of(s->as.npy) + s->tail.length;
+    return s->head.length + (uint64_t)s->count * npy_size(s->as.npy) + s->tail.length;
 }
 
 size_t answer_stream_held(const answer_stream *s) {

@@ -10,10 +10,10 @@
 #define JSON_FLOAT_MAX 16
 #define JSON_FLOAT_ROOM 32
 
-/* Writes the shortest decimal that reads back as the same float (in a few cases per thousand a longer one,
- * never of more than 9 digits), or null for a value that is not finite, and returns how many characters. No
- * NUL is written; to has room for the longest. */
-size_t json_write_float(char *to, float value);
+/* Writes each number with a comma behind it, in the shortest decimal that reads back as the same float, also
+ * through a double, and of several the nearest; null for a value that is not finite. Returns the end. No NUL
+ * is written; `to` has room for JSON_FLOAT_MAX + 1 bytes a number, and JSON_FLOAT_ROOM for the last. */
+char *json_write_numbers(char *to, const float *values, size_t count);
 
 /* Appends [v0,v1,...], null for a value that is not finite; false when memory is short. */
 bool json_write_floats(buffer *b, const float *values, size_t count);

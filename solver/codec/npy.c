@@ -338,30 +338,37 @@ bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape
     return buffer_append(b, "\n", 1);
 }
 
-bool npy_write_values(buffer *b, npy_type type, const float *values, size_t count) {
-    static const size_t sizes[] = {[NPY_F2] = 2, [NPY_F4] = 4, [NPY_F8] = 8};
-    size_t bytes;
-    if (!size_multiply(count, sizes[type], &bytes) || !buffer_reserve(b, bytes)) return false;
-    char *to = b->bytes + b->length;
+size_t npy_size(npy_type type) {
+    static const size_t sizes[] = {[NPY_F2] = 2, [NPY_F4] = 4, [NPY_F8] = 8, [NPY_U4] = 4, [NPY_I4] = 4};
+    return sizes[type];
+}
+
+void npy_convert(npy_type type, const float *values, size_t count, char *to) {
     if (type == NPY_F4) {
-        memcpy(to, values, bytes);
+        memcpy(to, values, count * sizeof *values);
+    } else if (type == NPY_F2) {
+        halves_of_floats(values, count, to);
     } else {
         for (size_t i = 0; i < count; i++) {
             const double wide = (double)values[i];
-            const uint16_t half = half_of_float(values[i]);
-            const void *from = type == NPY_F2 ? (const void *)&half : &wide;
-            memcpy(to + i * sizes[type], from, sizes[type]);
+            memcpy(to + i * sizeof wide, &wide, sizeof wide);
         }
     }
+}
+
+bool npy_write_values(buffer *b, npy_type type, const float *values, size_t count) {
+    size_t bytes;
+    if (!size_multiply(count, npy_size(type), &bytes) || !buffer_reserve(b, bytes)) return false;
+    npy_convert(type, values, count, b->bytes + b->length);
     b->length += bytes;
     b->bytes[b->length] = '\0';
     return true;
 }
 
 bool npy_write_doubles(buffer *b, npy_type type, const double *values, size_t count, double *rounding) {
-    static const size_t sizes[] = {[NPY_F2] = 2, [NPY_F4] = 4, [NPY_F8] = 8};
+    const size_t each = npy_size(type);
     size_t bytes;
-    if (!size_multiply(count, sizes[type], &bytes) || !buffer_reserve(b, bytes)) return false;
+    if (!size_multiply(count, each, &bytes) || !buffer_reserve(b, bytes)) return false;
     char *to = b->bytes + b->length;
     for (size_t i = 0; i < count; i++) {
         const float single = (float)values[i];
@@ -372,7 +379,7 @@ bool npy_write_doubles(buffer *b, npy_type type, const double *values, size_t co
                            : type == NPY_F4 ? (const void *)&single
                                             : (const void *)&half;
         *rounding = fmax(*rounding, fabs(kept - values[i]));
-        memcpy(to + i * sizes[type], from, sizes[type]);
+        memcpy(to + i * each, from, each);
     }
     b->length += bytes;
     b->bytes[b->length] = '\0';

@@ -13,6 +13,12 @@ typedef enum npy_type { NPY_F2, NPY_F4, NPY_F8, NPY_U4, NPY_I4 } npy_type;
 #define NPY_HEADER_MOST 192
 bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape);
 
+/* Bytes of a number. */
+size_t npy_size(npy_type type);
+
+/* Writes values[0..count) as floating-point numbers of this type. NPY_F2 may be written over the values. */
+void npy_convert(npy_type type, const float *values, size_t count, char *to);
+
 /* Appends values[0..count). */
 bool npy_write_values(buffer *b, npy_type type, const float *values, size_t count);
 

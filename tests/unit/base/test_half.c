@@ -24,10 +24,43 @@ START_TEST(halves_come_back_and_go_to_the_nearest) {
 }
 END_TEST
 
+/* Many at once, of any bits, also in the place of the floats: as one by one. */
+START_TEST(halves_of_many) {
+    enum { MANY = 4099 };
+    static float x[MANY];
+    static uint16_t halves[MANY];
+    static float over[MANY];
+    uint32_t bits = 1;
+    for (size_t i = 0; i < MANY; i++) {
+        bits = bits * 1664525u + 1013904223u;
+        /* Half of them near the range of f16, the others anywhere. */
+        x[i] = float_of_bits(i % 2 == 0 ? bits : (bits & 0x8FFFFFFFu) | 0x30000000u);
+    }
+    for (size_t count = 0; count <= MANY; count = count < 40 ? count + 1 : count + 4059) {
+        memset(halves, 0x55, sizeof halves);
+        halves_of_floats(x, count, halves);
+        memcpy(over, x, sizeof x);
+        halves_of_floats(over, count, over);
+        for (size_t i = 0; i < count; i++) {
+            const uint16_t one = half_of_float(x[i]);
+            if (isnan(x[i]))
+                ck_assert(isnan(float_of_half(halves[i])));
+            else
+                ck_assert_uint_eq(halves[i], one);
+            uint16_t there;
+            memcpy(&there, (const char *)over + 2 * i, sizeof there);
+            ck_assert_uint_eq(there, halves[i]);
+        }
+        if (count < MANY) ck_assert_uint_eq(halves[count], 0x5555);
+    }
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("half");
     TCase *tests = tcase_create("half");
     tcase_add_test(tests, halves_come_back_and_go_to_the_nearest);
+    tcase_add_test(tests, halves_of_many);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
