@@ -341,13 +341,24 @@ done:
     return status;
 }
 
+/* The least float from a number on, and the greatest up to it: floats compare with these as with it. */
+static float float_from(double x) {
+    const float nearest = (float)x;
+    return (double)nearest < x ? nextafterf(nearest, INFINITY) : nearest;
+}
+
+static float float_up_to(double x) {
+    const float nearest = (float)x;
+    return (double)nearest > x ? nextafterf(nearest, -INFINITY) : nearest;
+}
+
 /* Counts the hours of n answers x [n][width] that a figure takes. */
-static void count_hours(const annual_figure *f, size_t n, size_t width, const float *x, uint32_t *count) {
+static void count_hours(const annual_figure *f, size_t n, size_t width, const float *restrict x,
+                        uint32_t *restrict count) {
+    const float low = float_from(f->low), high = float_up_to(f->high);
     for (size_t k = 0; k < n; k++)
-        for (size_t i = 0; i < width; i++) {
-            const double value = (double)x[k * width + i];
-            count[i] += value >= f->low && value <= f->high;
-        }
+#pragma omp simd
+        for (size_t i = 0; i < width; i++) count[i] += (x[k * width + i] >= low) & (x[k * width + i] <= high);
 }
 
 static void count_all(const work *w, size_t n, size_t width, const float *x, uint32_t *count) {
@@ -381,10 +392,11 @@ static lam_status count_mixed(const work *w, const emission *light, tile_answers
             memcpy(a->share + k * a->terms, light->L + (vectors[k] * C + c) * m, m * sizeof *a->share);
             a->share[k * a->terms + m] = 1;
         }
-        dense_multiply(n, a->terms, width, a->share, a->x + c * a->terms * width, false, a->mixed);
+        dense_multiply(n, a->terms, width, a->share, a->x + c * a->terms * width, false,
+                       C == 1 ? a->whole : a->mixed);
         for (size_t k = 0; k < n; k++) {
             float *const x = a->whole + (k * C + c) * width;
-            memcpy(x, a->mixed + k * width, width * sizeof *x);
+            if (C > 1) memcpy(x, a->mixed + k * width, width * sizeof *x);
             if (sunny[k] == n) continue;
             const float *by_sun = a->sunny + (sunny[k] * C + c) * width;
             for (size_t i = 0; i < width; i++) x[i] += by_sun[i];

@@ -1,12 +1,25 @@
 #include "solver/operator/first_rows.h"
 
+#include "solver/base/cpu.h"
 #include "store/status.h"
 
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-enum { BLOCK = 512 }; /* elements whose sums stay in the cache from one source to the next */
+/* Elements whose rows stay in the second cache from some results to the next; results and elements whose sums
+ * are kept in registers over many sources; and sources that are taken at a time. */
+enum { BLOCK = 512, TOGETHER = 8, LANES = 16, SOURCES = 256 };
+
+/* Some sources of some results: the weights of those that matter to one of them, and where their rows are. */
+typedef struct source_list {
+    size_t count;
+    const float *rows[SOURCES];
+    double weight[SOURCES][TOGETHER];
+} source_list;
+
+#define CPU_KERNELS "solver/operator/first_rows_kernels.inc"
+#include "solver/base/cpu_kernels.inc"
 
 lam_status first_rows_load(store *s, const char *name, const char *source, size_t n, const bool *is_signed,
                            first_rows *out, lam_error *error) {
@@ -47,21 +60,45 @@ static double factor_of(const row_factors *f, size_t row, size_t m, size_t t) {
     return f == NULL || f->values == NULL ? 1 : f->values[row % f->n_channels * m + t];
 }
 
+/* Sources first ... last of results q ... q + count. */
+static void list_sources(const first_rows *r, size_t first, size_t last, size_t q, size_t count,
+                         const float *w, const row_factors *f, source_list *list) {
+    const size_t m = r->m;
+    list->count = 0;
+    for (size_t t = first; t < last; t++) {
+        double *weight = list->weight[list->count];
+        bool matters = false;
+        for (size_t k = 0; k < TOGETHER; k++) {
+            weight[k] = k < count ? (double)w[(q + k) * m + t] * factor_of(f, q + k, m, t) : 0;
+            matters = matters || weight[k] != 0;
+        }
+        list->rows[list->count] = r->values + t * r->n;
+        list->count += matters;
+    }
+}
+
+typedef void add_sources(const source_list *list, size_t first, size_t count, bool one, double (*sum)[BLOCK]);
+
+/* H0_q = sum_t w_qt row_t, each sum in the order of the sources. */
 void first_rows_apply(const first_rows *r, size_t n_rows, const float *w, const row_factors *f, bool add,
                       float *H0) {
+    static add_sources *const adds[] = CPU_TABLE(add_sources_portable, add_sources_avx2, add_sources_avx512);
+    add_sources *const add_some = adds[cpu_best()];
     const size_t m = r->m, n = r->n;
     for (size_t first = 0; first < n; first += BLOCK) {
         const size_t count = n - first < BLOCK ? n - first : BLOCK;
-        for (size_t q = 0; q < n_rows; q++) {
-            double sum[BLOCK] = {0};
-            float *to = H0 + q * n + first;
-            for (size_t t = 0; t < m; t++) {
-                const double weight = (double)w[q * m + t] * factor_of(f, q, m, t);
-                const float *row = r->values + t * n + first;
-                if (weight == 0) continue;
-                for (size_t i = 0; i < count; i++) sum[i] += weight * (double)row[i];
+        for (size_t q = 0; q < n_rows; q += TOGETHER) {
+            const size_t some = n_rows - q < TOGETHER ? n_rows - q : TOGETHER;
+            double sum[TOGETHER][BLOCK] = {{0}};
+            for (size_t t = 0; t < m; t += SOURCES) {
+                source_list list;
+                list_sources(r, t, m - t < SOURCES ? m : t + SOURCES, q, some, w, f, &list);
+                add_some(&list, first, count, some == 1, sum);
             }
-            for (size_t i = 0; i < count; i++) to[i] = (float)(sum[i] + (add ? (double)to[i] : 0));
+            for (size_t k = 0; k < some; k++) {
+                float *to = H0 + (q + k) * n + first;
+                for (size_t i = 0; i < count; i++) to[i] = (float)(sum[k][i] + (add ? (double)to[i] : 0));
+            }
         }
     }
 }

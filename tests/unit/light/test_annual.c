@@ -139,19 +139,23 @@ START_TEST(bounds) {
     annual_options wish = {.hours = 1, .from = 0, .to = 24};
     annual_summary sum = {0};
     const float reflectance[1] = {.5f};
-    float light[] = {0, 100, 2000, 2001, 99, 300}, *values = NULL;
-    const emission e = {.n_vectors = 6, .batch = true, .E = light};
+    /* .1 and .3 lie between floats; the float next to .1 is above it, and so is that of .3. */
+    float light[] = {0, 100, 2000, 2001, 99, 300, .1f, nextafterf(.1f, 0), .3f, nextafterf(.3f, 0)},
+          *values = NULL;
+    const emission e = {.n_vectors = 10, .batch = true, .E = light};
     float *P = calloc(1, sizeof *P);
     ck_assert_int_eq(operator_exact_create(1, 1, reflectance, P, &op, &error), LAM_OK);
-    static const char *const items[] = {"useful=100,2000", "autonomy=300", "useful=0,99", "sum"};
-    for (size_t k = 0; k < 4; k++) ck_assert_int_eq(annual_add(&wish, items[k], &error), LAM_OK);
+    static const char *const items[] = {"useful=100,2000", "autonomy=300", "useful=0,99", "sum",
+                                        "useful=.1,.3"};
+    for (size_t k = 0; k < 5; k++) ck_assert_int_eq(annual_add(&wish, items[k], &error), LAM_OK);
     ck_assert_int_eq(annual_apply(&wish, &e, op, NULL, LAM_RADIOSITY, 0, NULL, NULL, &values, &sum, &error),
                      LAM_OK);
-    ck_assert_float_eq(values[0], 3.f / 6);
-    ck_assert_float_eq(values[1], 3.f / 6);
-    ck_assert_float_eq(values[2], 2.f / 6);
-    ck_assert_float_eq_tol(values[3], 4.5f, 1e-6f);
-    ck_assert(sum.n == 6 && sum.lit == 5 && sum.counted == 6);
+    ck_assert_float_eq(values[0], 3.f / 10);
+    ck_assert_float_eq(values[1], 3.f / 10);
+    ck_assert_float_eq(values[2], 6.f / 10);
+    ck_assert_float_eq_tol(values[3], 4.5008f, 1e-6f);
+    ck_assert_float_eq(values[4], 2.f / 10);
+    ck_assert(sum.n == 10 && sum.lit == 9 && sum.counted == 10);
     ck_assert_str_eq(wish.figures[0].name, "useful_100_2000");
     free(values);
     lam_operator_close(op);
