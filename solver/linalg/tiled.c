@@ -214,6 +214,16 @@ static float sum_of_lanes(const float *lanes) {
     return (quarter[0] + quarter[2]) + (quarter[1] + quarter[3]);
 }
 
+/* Lanes of a whole register, of which a row of four tiles has TILE_LANES. */
+enum { LANES_ROOM = 16 };
+
+/* sums_l = sum_r values_rl X_r of the columns of a four, each rounded after every operation. */
+static inline void sum_columns_portable(const tile_four *four, const float *X, float *sums) {
+    for (size_t l = 0; l < TILE_LANES; l++)
+        sums[l] = (float)four->values[0][l] * X[0] + (float)four->values[1][l] * X[1] +
+                  (float)four->values[2][l] * X[2];
+}
+
 #define KERNEL(name) name##_portable
 #define TARGET
 #include "solver/linalg/tiled_kernels.inc"
@@ -233,6 +243,37 @@ static void group_portable(const tiled_rows *t, size_t g, const float *x, float 
 }
 
 #ifdef CPU_AVX2_TARGET
+/* Columns 0 to 7 of a row, and 8 to 11, times x. */
+CPU_AVX2_TARGET static inline __m256 low_columns(const int8_t *v, float x) {
+    const __m128i bytes = _mm_loadl_epi64((const __m128i *)(const void *)v);
+    return _mm256_mul_ps(_mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(bytes)), _mm256_set1_ps(x));
+}
+
+CPU_AVX2_TARGET static inline __m128 high_columns(const int8_t *v, float x) {
+    int32_t last;
+    memcpy(&last, v + 8, sizeof last);
+    return _mm_mul_ps(_mm_cvtepi32_ps(_mm_cvtepi8_epi32(_mm_cvtsi32_si128(last))), _mm_set1_ps(x));
+}
+
+CPU_AVX2_TARGET static inline void sum_columns_avx2(const tile_four *four, const float *X, float *sums) {
+    const int8_t(*v)[TILE_LANES] = four->values;
+    _mm256_store_ps(sums, _mm256_add_ps(_mm256_add_ps(low_columns(v[0], X[0]), low_columns(v[1], X[1])),
+                                        low_columns(v[2], X[2])));
+    _mm_store_ps(sums + 8, _mm_add_ps(_mm_add_ps(high_columns(v[0], X[0]), high_columns(v[1], X[1])),
+                                      high_columns(v[2], X[2])));
+}
+
+CPU_AVX512_TARGET static inline __m512 all_columns(const int8_t *v, float x) {
+    const __m128i bytes = _mm_loadu_si128((const __m128i *)(const void *)v);
+    return _mm512_mul_ps(_mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(bytes)), _mm512_set1_ps(x));
+}
+
+CPU_AVX512_TARGET static inline void sum_columns_avx512(const tile_four *four, const float *X, float *sums) {
+    const int8_t(*v)[TILE_LANES] = four->values;
+    _mm512_store_ps(sums, _mm512_add_ps(_mm512_add_ps(all_columns(v[0], X[0]), all_columns(v[1], X[1])),
+                                        all_columns(v[2], X[2])));
+}
+
 #define KERNEL(name) name##_avx2
 #define TARGET CPU_AVX2_TARGET
 #include "solver/linalg/tiled_kernels.inc"
@@ -332,7 +373,7 @@ CPU_AVX512_TARGET static void group_avx512(const tiled_rows *t, size_t g, const 
 /* Each multiplies a group of rows with the scaled columns, or the transposed rows, added to y. */
 typedef struct kernels {
     void (*one)(const tiled_rows *t, size_t g, const float *x, float *y);
-    void (*columns)(const tiled_rows *t, size_t g, const float *x, float *y);
+    void (*columns)(const tiled_rows *t, size_t g, const float *x, const uint8_t *wanted, float *y);
 } kernels;
 
 #define KERNELS(name) {group_##name, columns_##name}
@@ -358,12 +399,10 @@ void tiled_multiply(const tiled_rows *t, const float *scaled, float *y, size_t n
     parallel_share(many ? n_threads : 1, t->n_groups, GROUPS_AT_ONCE, multiply_groups, &p);
 }
 
-void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *rows, const float *scaled,
+void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *groups, const float *scaled,
                          float *y) {
     const kernels run = kernels_of[cpu_best()];
-    for (size_t k = 0; k < count; k++)
-        if (k == 0 || t->group_of[rows[k]] != t->group_of[rows[k - 1]])
-            run.one(t, t->group_of[rows[k]], scaled, y);
+    for (size_t k = 0; k < count; k++) run.one(t, groups[k], scaled, y);
 }
 
 static bool is_dark(const tiled_rows *t, size_t g, const float *scaled) {
@@ -376,31 +415,49 @@ uint64_t tiled_few(const tiled_rows *t) {
     return t->begin[t->n_groups * t->n_planes] / COLUMNS_SHARE;
 }
 
+/* Adds the fours of the columns of a group to *met, unless X is 0 there. */
+static void meet(const tiled_rows *t, size_t g, const float *scaled, uint64_t *met) {
+    if (!is_dark(t, g, scaled)) *met += t->begin[(g + 1) * t->n_planes] - t->begin[g * t->n_planes];
+}
+
 bool tiled_few_columns(const tiled_rows *t, const float *scaled) {
     const uint64_t most = tiled_few(t);
     uint64_t met = 0;
-    for (size_t g = 0; g < t->n_groups; g++) {
-        if (is_dark(t, g, scaled)) continue;
-        met += t->begin[(g + 1) * t->n_planes] - t->begin[g * t->n_planes];
-        if (met > most) return false;
-    }
-    return true;
+    for (size_t g = 0; g < t->n_groups && met <= most; g++) meet(t, g, scaled, &met);
+    return met <= most;
+}
+
+bool tiled_few_columns_of(const tiled_rows *t, size_t count, const uint32_t *groups, const float *scaled) {
+    const uint64_t most = tiled_few(t);
+    uint64_t met = 0;
+    for (size_t k = 0; k < count && met <= most; k++) meet(t, groups[k], scaled, &met);
+    return met <= most;
 }
 
 void tiled_add_columns(const tiled_rows *t, size_t g, const float *x, float *y) {
-    kernels_of[cpu_best()].columns(t, g, x, y);
+    kernels_of[cpu_best()].columns(t, g, x, NULL, y);
+}
+
+/* y += the columns of group g, but for the step of a row, as long as a row of wanted is met. */
+static void add_group(const tiled_rows *t, size_t g, const uint8_t *wanted, const float *scaled, float *y) {
+    float x[TILE] = {0};
+    if (is_dark(t, g, scaled)) return;
+    for (size_t r = 0, i = t->first[g]; i < t->first[g + 1]; r++, i++) x[r] = scaled[i];
+    kernels_of[cpu_best()].columns(t, g, x, wanted, y);
 }
 
 void tiled_multiply_columns(const tiled_rows *t, const float *scaled, float *y) {
-    const kernels run = kernels_of[cpu_best()];
     memset(y, 0, (t->n + TILED_PAST) * sizeof *y);
-    for (size_t g = 0; g < t->n_groups; g++) {
-        float x[TILE] = {0};
-        if (is_dark(t, g, scaled)) continue;
-        for (size_t r = 0, i = t->first[g]; i < t->first[g + 1]; r++, i++) x[r] = scaled[i];
-        run.columns(t, g, x, y);
-    }
+    for (size_t g = 0; g < t->n_groups; g++) add_group(t, g, NULL, scaled, y);
     for (size_t i = 0; i < t->n; i++) y[i] *= t->step[i];
+}
+
+void tiled_multiply_columns_of(const tiled_rows *t, size_t n_lit, const uint32_t *lit, size_t n_asked,
+                               const uint32_t *asked, const uint8_t *wanted, const float *scaled, float *y) {
+    memset(y, 0, (t->n + TILED_PAST) * sizeof *y);
+    for (size_t k = 0; k < n_lit; k++) add_group(t, lit[k], wanted, scaled, y);
+    for (size_t k = 0; k < n_asked; k++)
+        for (size_t i = t->first[asked[k]]; i < t->first[asked[k] + 1]; i++) y[i] *= t->step[i];
 }
 
 size_t tiled_bytes(const tiled_rows *t) {

@@ -56,21 +56,29 @@ void tiled_multiply(const tiled_rows *t, const float *scaled, float *y, size_t n
 void tiled_multiply_lanes(const tiled_rows *t, size_t count, const float *scaled, float *Y, float *work,
                           size_t n_threads);
 
-/* y_i = (A X)_i for `count` rows i, with the bits of tiled_multiply; other entries of y may change. */
-void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *rows, const float *scaled,
+/* y_i = (A X)_i for the rows of `count` groups, with the bits of tiled_multiply. */
+void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *groups, const float *scaled,
                          float *y);
 
 /* The fours of columns up to which their sum costs less than the rows. */
 uint64_t tiled_few(const tiled_rows *t);
 
-/* True when the columns in which X is not 0 have no more fours. */
+/* True when the columns in which X is not 0 have no more fours. In the second form these are among the
+ * columns of `count` groups. */
 bool tiled_few_columns(const tiled_rows *t, const float *scaled);
+bool tiled_few_columns_of(const tiled_rows *t, size_t count, const uint32_t *groups, const float *scaled);
 
 /* y += the columns of group g, whose scaled numbers are x [TILE], 0 behind the group's: y_i lacks step_i. */
 void tiled_add_columns(const tiled_rows *t, size_t g, const float *x, float *y);
 
 /* y = A X by the columns in which X is not 0, of which there may be none. */
 void tiled_multiply_columns(const tiled_rows *t, const float *scaled, float *y);
+
+/* The same bits in the rows of n_asked groups, where the columns in which X is not 0 are among those of n_lit
+ * groups, ascending; wanted [n] is not 0 at the first row of the groups asked, and 0 at that of others. Other
+ * entries of y may change. */
+void tiled_multiply_columns_of(const tiled_rows *t, size_t n_lit, const uint32_t *lit, size_t n_asked,
+                               const uint32_t *asked, const uint8_t *wanted, const float *scaled, float *y);
 
 /* Bytes that a product reads. */
 size_t tiled_bytes(const tiled_rows *t);

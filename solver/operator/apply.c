@@ -138,6 +138,28 @@ typedef struct pass {
     lam_quantity quantity;
 } pass;
 
+/* A pass of a kind that gives answers, n_out numbers in a channel of each. */
+static void list_answers(const lam_operator *op, const pass *in, size_t n_out, float *out,
+                         operator_vector *vectors) {
+    const size_t C = op->n_channels, n = op->n;
+    for (size_t v = 0; v < in->count; v++)
+        vectors[v] = (operator_vector){in->quantity, in->E + v * C * n,
+                                       in->H0 != NULL ? in->H0 + v * C * n : NULL, out + v * C * n_out};
+}
+
+/* The answers for some elements; where these are many they are picked out of whole answers. */
+static void answer_selected(const lam_operator *op, const pass *in, float *out, void *work) {
+    const size_t rows = in->count * op->n_channels, width = in->n_selected;
+    operator_vector vectors[OPERATOR_PASS];
+    list_answers(op, in, width, out, vectors);
+    if (op->kind->answer_selected(op, in->count, vectors, width, in->selected, work)) return;
+    float *whole = work_area_take(&work, rows * op->n * sizeof *whole);
+    list_answers(op, in, op->n, whole, vectors);
+    op->kind->answer(op, in->count, vectors, work);
+    for (size_t row = 0; row < rows; row++)
+        for (size_t r = 0; r < width; r++) out[row * width + r] = whole[row * op->n + in->selected[r]];
+}
+
 static void apply_pass(const lam_operator *op, const pass *in, float *out, void *work) {
     const size_t n = op->n, rows = in->count * op->n_channels, row_bytes = n * sizeof(float);
     const bool choose = in->selected != NULL && op->kind->apply_selected != NULL;
@@ -147,10 +169,12 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
     void *rest = work_area_begin(work);
     if (in->selected == NULL && op->kind->answer != NULL) {
         operator_vector vectors[OPERATOR_PASS];
-        for (size_t v = 0, at = 0; v < in->count; v++, at += op->n_channels * n)
-            vectors[v] =
-                (operator_vector){in->quantity, in->E + at, in->H0 != NULL ? in->H0 + at : NULL, out + at};
+        list_answers(op, in, n, out, vectors);
         op->kind->answer(op, in->count, vectors, rest);
+        return;
+    }
+    if (in->selected != NULL && op->kind->answer_selected != NULL) {
+        answer_selected(op, in, out, rest);
         return;
     }
     if (op->order != NULL || in->H0 != NULL) {

@@ -276,9 +276,9 @@ const operator_kind operator_hierarchical = {
     .save = hierarchical_save,
     .work_bytes = hierarchical_work_bytes,
     .apply = hierarchical_apply,
-    .apply_selected = hierarchical_apply_selected,
     .apply_adjoint = hierarchical_apply_adjoint,
     .answer = hierarchical_answer,
+    .answer_selected = hierarchical_answer_selected,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,
     /* Both triangles in tiles, of 12 bytes each; the store has of one triangle two bytes for a tile and one

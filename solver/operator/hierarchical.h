@@ -44,9 +44,9 @@ typedef struct hierarchical {
 size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs);
 void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work);
 void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
-void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
-                                 const uint32_t *selected, float *P, void *work);
 void hierarchical_answer(const lam_operator *op, size_t n_rhs, const operator_vector *vectors, void *work);
+bool hierarchical_answer_selected(const lam_operator *op, size_t n_rhs, const operator_vector *vectors,
+                                  size_t n_selected, const uint32_t *selected, void *work);
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels);
 

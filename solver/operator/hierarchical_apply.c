@@ -6,6 +6,7 @@
 #include "solver/base/parallel.h"
 #include "solver/base/work_area.h"
 #include "solver/operator/hierarchical.h"
+#include "solver/operator/hierarchical_some.h"
 #include "solver/operator/hierarchical_wide.h"
 
 #include <string.h>
@@ -22,11 +23,9 @@ static size_t one_work_bytes(const hierarchical *self) {
     const wavelet_plan *plan = &self->plan;
     const size_t parts[] = {self->base.n * sizeof(float), coefficients_of(self) * sizeof(float),
                             coefficients_of(self) * sizeof(float), wavelet_plan_work(plan) * sizeof(float),
-                            plan->n_pieces * sizeof(double),
-                            /* of some positions: steps, coefficients, positions and flags */
-                            plan->n_steps * sizeof(uint32_t), plan->n_used * sizeof(uint32_t),
-                            plan->n * sizeof(uint32_t), plan->n_steps};
+                            plan->n_pieces * sizeof(double)};
     size_t total = WORK_AREA_ALIGN;
+    if (!hierarchical_some_add(self, &total)) return 0;
     for (size_t k = 0; k < sizeof parts / sizeof *parts; k++)
         if (!work_area_add(&total, parts[k])) return 0;
     return total;
@@ -229,9 +228,17 @@ void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, 
     apply_by_position(op, true, n_rhs, g, w, work);
 }
 
+/* The channel of a vector that is answered. */
+static void set_vector(channel *h, size_t c, const operator_vector *v) {
+    const size_t n = h->self->base.n;
+    h->c = c;
+    h->quantity = v->quantity;
+    h->E = v->E + c * n;
+    h->H0 = v->H0 != NULL ? v->H0 + c * n : NULL;
+}
+
 void hierarchical_answer(const lam_operator *op, size_t n_rhs, const operator_vector *vectors, void *work) {
     const hierarchical *self = (const hierarchical *)op;
-    const size_t n = op->n;
     if (n_rhs >= WIDE_WORTH) {
         for (size_t c = 0; c < op->n_channels; c++) hierarchical_wide_answer(self, c, n_rhs, vectors, work);
         return;
@@ -239,62 +246,54 @@ void hierarchical_answer(const lam_operator *op, size_t n_rhs, const operator_ve
     areas a = take_areas(self, &work);
     for (size_t c = 0; c < op->n_channels; c++)
         for (size_t v = 0; v < n_rhs; v++) {
-            a.h.c = c;
-            a.h.quantity = vectors[v].quantity;
-            a.h.E = vectors[v].E + c * n;
-            a.h.H0 = vectors[v].H0 != NULL ? vectors[v].H0 + c * n : NULL;
-            a.h.out = vectors[v].out + c * n;
+            set_vector(&a.h, c, &vectors[v]);
+            a.h.out = vectors[v].out + c * op->n;
             apply_channel(&a);
         }
 }
 
-/* Where more than one in so many steps is needed, the whole answer is as quick. */
-enum { SOME_STEPS = 4 };
-
-/* For some elements: only their ancestors in the tree and the rows of K of these. */
-void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
-                                 const uint32_t *selected, float *P, void *work) {
-    const hierarchical *self = (const hierarchical *)op;
-    const wavelet_plan *plan = &self->plan;
-    const size_t n = op->n, C = op->n_channels;
-    areas a = take_areas(self, &work);
-    uint32_t *steps = work_area_take(&work, plan->n_steps * sizeof *steps);
-    uint32_t *rows = work_area_take(&work, plan->n_used * sizeof *rows);
-    uint32_t *positions = work_area_take(&work, n * sizeof *positions);
-    uint8_t *flags = work_area_take(&work, plan->n_steps);
-    size_t n_steps = plan->n_steps, n_rows = plan->n_used;
-    memset(flags, 0, plan->n_steps);
-    const bool few = n_selected <= n;
-    for (size_t r = 0; few && r < n_selected; r++)
-        positions[r] = (uint32_t)operator_position(op, selected[r]);
-    if (few) n_steps = wavelet_plan_paths(plan, n_selected, positions, flags, steps);
-    const bool some = few && n_steps * SOME_STEPS < plan->n_steps;
-    if (some) n_rows = wavelet_plan_coefficients(plan, n_steps, steps, rows);
-    for (size_t row = 0; row < n_rhs * C; row++) {
-        const size_t c = row % C;
-        const tiled_rows *K = &self->K[self->of_channel[c]];
-        const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
-        float *to = P + row * n_selected;
-        a.h.c = c;
-        a.h.in = E + row * n;
-        if (is_dark(&a.h)) {
-            memset(to, 0, n_selected * sizeof *to);
-            continue;
-        }
-        analyse(&a);
-        if (!some) {
-            multiply_core(self, c, a.from, a.to);
-            wavelet_plan_inverse(plan, a.to, a.h.X, NULL, NULL, a.slots, op->n_threads);
-        } else {
-            if (tiled_few_columns(K, a.from))
-                tiled_multiply_columns(K, a.from, a.to);
-            else
-                tiled_multiply_rows(K, n_rows, rows, a.from, a.to);
-            wavelet_plan_inverse_some(plan, n_steps, steps, a.to, a.h.X, a.slots);
-        }
-        const float factor = mean_factor(&a.h);
-        for (size_t r = 0; r < n_selected; r++)
-            to[r] = bounced(self->left_of_element[c * n + selected[r]], lift, factor, a.h.X,
-                            operator_position(op, selected[r]));
+static void answer_some(areas *a, hierarchical_some *some, size_t n_selected, const uint32_t *selected) {
+    const channel *h = &a->h;
+    const hierarchical *self = h->self;
+    const size_t n = self->base.n, c = h->c;
+    const float *left = self->left_of_element + c * n,
+                *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
+    const bool few = hierarchical_some_light(some, h->E, h->H0);
+    float factor;
+    if (few && some->lit.n_steps == 0) { /* no light at all */
+        for (size_t r = 0; r < n_selected; r++) h->out[r] = answer_of(h, selected[r], 0);
+        return;
     }
+    if (few) {
+        factor = hierarchical_some_forward(some, c, h->E, h->H0, h->X, a->from, a->slots);
+    } else {
+        analyse(a);
+        factor = mean_factor(h);
+    }
+    hierarchical_some_multiply(some, c, few, a->from, a->to);
+    wavelet_plan_inverse_some(&self->plan, some->asked.n_steps, some->asked.steps, a->to, h->X, a->slots);
+    for (size_t r = 0; r < n_selected; r++) {
+        const size_t i = selected[r], p = operator_position(&self->base, i);
+        h->out[r] = answer_of(h, i, bounced(left[i], lift, factor, h->X, p));
+    }
+}
+
+/* Where more than one in so many steps is needed, the whole answer is as quick: of few vectors, of many. */
+enum { SOME_STEPS = 2, SOME_STEPS_WIDE = 6 };
+
+bool hierarchical_answer_selected(const lam_operator *op, size_t n_rhs, const operator_vector *vectors,
+                                  size_t n_selected, const uint32_t *selected, void *work) {
+    const hierarchical *self = (const hierarchical *)op;
+    areas a = take_areas(self, &work);
+    hierarchical_some some = hierarchical_some_take(self, &work);
+    if (!hierarchical_some_ask(&some, n_selected, selected,
+                               n_rhs >= WIDE_WORTH ? SOME_STEPS_WIDE : SOME_STEPS))
+        return false;
+    for (size_t c = 0; c < op->n_channels; c++)
+        for (size_t v = 0; v < n_rhs; v++) {
+            set_vector(&a.h, c, &vectors[v]);
+            a.h.out = vectors[v].out + c * n_selected;
+            answer_some(&a, &some, n_selected, selected);
+        }
+    return true;
 }

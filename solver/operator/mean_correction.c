@@ -92,16 +92,18 @@ done:
     return status;
 }
 
-/* Partial sums side by side, as one would wait for each addition in turn. */
-enum { PARTS = 8 };
-
-double mean_correction_sum(const float *by, const float *x, size_t count) {
-    double parts[PARTS] = {0};
-    size_t p = 0;
-    for (; p + PARTS <= count; p += PARTS)
-        for (size_t k = 0; k < PARTS; k++) parts[k] += (double)by[p + k] * (double)x[p + k];
-    for (size_t k = 0; p < count; p++, k++) parts[k] += (double)by[p] * (double)x[p];
+double mean_correction_total(const double *parts) {
     return ((parts[0] + parts[1]) + (parts[2] + parts[3])) + ((parts[4] + parts[5]) + (parts[6] + parts[7]));
+}
+
+/* The partial sums, as one would wait for each addition in turn. */
+double mean_correction_sum(const float *by, const float *x, size_t count) {
+    double parts[MEAN_PARTS] = {0};
+    size_t p = 0;
+    for (; p + MEAN_PARTS <= count; p += MEAN_PARTS)
+        for (size_t k = 0; k < MEAN_PARTS; k++) parts[k] += (double)by[p + k] * (double)x[p + k];
+    for (size_t k = 0; p < count; p++, k++) parts[k] += (double)by[p] * (double)x[p];
+    return mean_correction_total(parts);
 }
 
 lam_status mean_correction_lift(mean_correction *e, const float *by, lam_error *error) {

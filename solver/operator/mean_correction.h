@@ -38,6 +38,11 @@ lam_status mean_correction_lift(mean_correction *e, const float *by, lam_error *
  * y += A (sum_i lift_i x_i) / light. */
 double mean_correction_sum(const float *by, const float *x, size_t count);
 
+/* Such a sum has partial sums side by side: of number p in parts[p % MEAN_PARTS], added up by
+ * mean_correction_total. */
+enum { MEAN_PARTS = 8 };
+double mean_correction_total(const double *parts);
+
 /* Bytes that a product reads. */
 size_t mean_correction_bytes(const mean_correction *e);
 

@@ -29,7 +29,9 @@ typedef struct operator_description {
  * (emitters_apply.c); apply_selected, the rows of apply for the n_selected elements selected
  * (operator_position says where they are), P being [n_rhs][C][n_selected] (without it all rows are computed);
  * answer, which is the quantity of E' = E + rho H0 (operator_finish) of each vector, so that an answer in
- * position order is never in memory;
+ * position order is never in memory; answer_selected, beside answer and in place of apply_selected, which
+ * writes the same bits of n_selected elements to out [C][n_selected] of each vector, or returns false where
+ * whole answers take no longer, and has written none;
  * set_threads, which passes n_threads on to its arrays;
  * narrow, which makes the operator again with its large arrays in another precision, all of its own; relight,
  * which makes it again under other reflectances, its large arrays those of op; check, which compares the
@@ -37,7 +39,7 @@ typedef struct operator_description {
  * false. */
 #define OPERATOR_PASS 16 /* a larger batch is cut into passes */
 
-/* A vector and its answer, [C][n] each, in mesh order. */
+/* A vector and its answer, [C][n] each, in mesh order, or the answer of elements selected. */
 typedef struct operator_vector {
     lam_quantity quantity;
     const float *E, *H0; /* H0 NULL: 0 */
@@ -55,6 +57,8 @@ typedef struct operator_kind {
     void (*apply_selected)(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
                            const uint32_t *selected, float *P, void *work);
     void (*answer)(const lam_operator *op, size_t n_rhs, const operator_vector *vectors, void *work);
+    bool (*answer_selected)(const lam_operator *op, size_t n_rhs, const operator_vector *vectors,
+                            size_t n_selected, const uint32_t *selected, void *work);
     void (*set_threads)(lam_operator *op, size_t n_threads);
     lam_status (*narrow)(const lam_operator *op, panel_precision precision, lam_operator **out,
                          lam_error *error);

@@ -336,15 +336,20 @@ static void inverse_pieces(const void *job, size_t thread, size_t first, size_t 
     }
 }
 
-void wavelet_plan_forward(const wavelet_plan *plan, wavelet_visit *fill, void *context, const float *X,
-                          const float *scale, float *C, float *work, size_t n_threads) {
+/* The scaling coefficients of the root are coefficients. */
+static void write_root(const wavelet_plan *plan, const float *scale, float *C, const float *work) {
     const plan_step *root = &plan->steps[plan->n_steps - 1];
-    const transform_job job = {plan, fill, context, X, scale, C, work};
     const float *s = work + (plan->n_steps - 1) * WAVELET_SCALING;
-    parallel_share(n_threads, plan->n_pieces, 1, forward_pieces, &job);
-    forward[cpu_best()](plan, 0, plan->n_above, plan->above, X, scale, C, work);
     for (size_t k = 0, i = plan->n_used - root->scaling; k < root->scaling; k++, i++)
         C[i] = scale != NULL ? s[k] * scale[i] : s[k];
+}
+
+void wavelet_plan_forward(const wavelet_plan *plan, wavelet_visit *fill, void *context, const float *X,
+                          const float *scale, float *C, float *work, size_t n_threads) {
+    const transform_job job = {plan, fill, context, X, scale, C, work};
+    parallel_share(n_threads, plan->n_pieces, 1, forward_pieces, &job);
+    forward[cpu_best()](plan, 0, plan->n_above, plan->above, X, scale, C, work);
+    write_root(plan, scale, C, work);
 }
 
 void wavelet_plan_inverse(const wavelet_plan *plan, const float *C, float *X, wavelet_visit *use,
@@ -357,42 +362,19 @@ void wavelet_plan_inverse(const wavelet_plan *plan, const float *C, float *X, wa
     parallel_share(n_threads, plan->n_pieces, 1, inverse_pieces, &job);
 }
 
-/* The leaf that takes a position. */
-static uint32_t leaf_of(const wavelet_plan *plan, uint32_t position) {
-    size_t low = 0, high = plan->n_leaves;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (plan->steps[plan->leaves[middle]].begin <= position)
-            low = middle;
-        else
-            high = middle;
+void wavelet_plan_forward_some(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
+                               const float *X, const float *scale, float *C, float *work) {
+    memset(C, 0, plan->n_used * sizeof *C);
+    if (n_steps == 0) return;
+    /* A child that is not among the steps is dark; one that is gets its numbers before its parent. */
+    for (size_t k = 0; k < n_steps; k++) {
+        const plan_step *a = &plan->steps[steps[k]];
+        if (a->from_left == 0) continue;
+        memset(work + (size_t)a->left * WAVELET_SCALING, 0, WAVELET_SCALING * sizeof *work);
+        memset(work + (size_t)(steps[k] - 1) * WAVELET_SCALING, 0, WAVELET_SCALING * sizeof *work);
     }
-    return plan->leaves[low];
-}
-
-size_t wavelet_plan_paths(const wavelet_plan *plan, size_t count, const uint32_t *positions, uint8_t *flags,
-                          uint32_t *out) {
-    size_t found = 0;
-    for (size_t k = 0; k < count; k++)
-        for (uint32_t t = leaf_of(plan, positions[k]); t != WAVELET_NONE && flags[t] == 0;
-             t = plan->steps[t].parent)
-            flags[t] = 1;
-    for (size_t t = 0; t < plan->n_steps; t++) {
-        if (flags[t] != 0) out[found++] = (uint32_t)t;
-        flags[t] = 0;
-    }
-    return found;
-}
-
-size_t wavelet_plan_coefficients(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
-                                 uint32_t *out) {
-    const size_t scaling = plan->steps[plan->n_steps - 1].scaling;
-    size_t count = 0;
-    for (size_t k = 0; k < n_steps; k++)
-        for (size_t q = 0; q < plan->steps[steps[k]].own; q++)
-            out[count++] = plan->steps[steps[k]].first + (uint32_t)q;
-    for (size_t q = plan->n_used - scaling; q < plan->n_used; q++) out[count++] = (uint32_t)q;
-    return count;
+    forward[cpu_best()](plan, 0, n_steps, steps, X, scale, C, work);
+    write_root(plan, scale, C, work);
 }
 
 void wavelet_plan_inverse_some(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,

@@ -66,17 +66,12 @@ void wavelet_plan_forward(const wavelet_plan *plan, wavelet_visit *fill, void *c
 void wavelet_plan_inverse(const wavelet_plan *plan, const float *C, float *X, wavelet_visit *use,
                           void *context, float *work, size_t n_threads);
 
-/* The steps on the paths from the root to some positions, ascending: out has room for n_steps, flags
- * [n_steps] are 0 before and after. Returns their number. */
-size_t wavelet_plan_paths(const wavelet_plan *plan, size_t count, const uint32_t *positions, uint8_t *flags,
-                          uint32_t *out);
-
-/* The coefficients that these steps read, ascending: out has room for n_used. Returns their number. */
-size_t wavelet_plan_coefficients(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
-                                 uint32_t *out);
-
-/* The inverse transform of one vector at the positions of these steps, with the bits of wavelet_plan_inverse;
- * the rest of X is not written. */
+/* Both transforms of one vector at the positions of some steps alone, which are ascending and reach up to the
+ * root (wavelet_paths.h). The forward one, of an X that is 0 wherever else, writes all C; it has the numbers
+ * of wavelet_plan_forward, but that a 0 may have another sign. The inverse one has the bits of
+ * wavelet_plan_inverse; the rest of X is not written. */
+void wavelet_plan_forward_some(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
+                               const float *X, const float *scale, float *C, float *work);
 void wavelet_plan_inverse_some(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
                                const float *C, float *X, float *work);
 

@@ -7,7 +7,7 @@
 
 #include <float.h>
 
-enum { N = 700, VECTORS = 16 };
+enum { N = 700, VECTORS = 16, ASKED = 40 };
 
 static lam_error error;
 
@@ -146,6 +146,35 @@ static void check_lanes(const tiled_rows *t, size_t count, const float *scaled, 
     free(one);
 }
 
+/* The rows of groups have the bits that they have among all. */
+static void check_groups(const tiled_rows *t, const uint32_t *asked, const float *some, const float *all) {
+    for (size_t k = 0; k < ASKED; k++)
+        for (size_t i = t->first[asked[k]]; i < t->first[asked[k] + 1]; i++)
+            ck_assert_mem_eq(&some[i], &all[i], sizeof *all);
+}
+
+/* So have they where only columns that are lit are looked at. */
+static void check_columns_of(const tiled_rows *t, const uint32_t *asked, const float *scaled,
+                             const float *all) {
+    uint8_t *wanted = test_allocate(N + TILED_PAST, sizeof *wanted);
+    uint32_t *lit = test_allocate(N, sizeof *lit);
+    float *some = test_allocate(N + TILED_PAST, sizeof *some);
+    size_t n_lit = 0;
+    for (size_t g = 0; g < t->n_groups; g++) {
+        bool any = g % 50 == 0; /* one that is dark may be among them */
+        for (size_t i = t->first[g]; i < t->first[g + 1]; i++) any = any || scaled[i] != 0;
+        if (any) lit[n_lit++] = (uint32_t)g;
+    }
+    for (size_t k = 0; k < ASKED; k++) wanted[t->first[asked[k]]] = 1;
+    for (size_t i = 0; i < N + TILED_PAST; i++) some[i] = NAN;
+    ck_assert(tiled_few_columns_of(t, n_lit, lit, scaled) == tiled_few_columns(t, scaled));
+    tiled_multiply_columns_of(t, n_lit, lit, ASKED, asked, wanted, scaled, some);
+    check_groups(t, asked, some, all);
+    free(wanted);
+    free(lit);
+    free(some);
+}
+
 START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     const int digits = 1 + _i;
     uint64_t state = 3;
@@ -153,7 +182,7 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     tile_matrix m, back;
     tile_group groups[N];
     float step[N], row_step[N];
-    uint32_t rows[40];
+    uint32_t asked[ASKED];
     float *X = test_allocate(VECTORS * N, sizeof *X), *one = test_allocate(N + TILED_PAST, sizeof *one),
           *Y = test_allocate(VECTORS * N + TILED_PAST, sizeof *Y);
     const size_t room = N + TILED_PAST;
@@ -177,11 +206,11 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
             check_lanes(&t, count, scaled, lanes, n_threads);
     for (size_t v = 0; v < VECTORS; v++) tiled_multiply(&t, scaled + v * room, Y + v * N, 1);
     check_against_double(N, K, X, Y);
-    for (size_t k = 0; k < 40; k++) rows[k] = (uint32_t)(k * 17 + 7 * (k % 3));
+    for (size_t k = 0; k < ASKED; k++) asked[k] = (uint32_t)(k * n_groups / ASKED);
     tiled_multiply(&t, scaled, one, 1);
     for (size_t i = 0; i < N; i++) Y[i] = NAN;
-    tiled_multiply_rows(&t, 40, rows, scaled, Y);
-    for (size_t k = 0; k < 40; k++) ck_assert_float_eq(Y[rows[k]], one[rows[k]]);
+    tiled_multiply_rows(&t, ASKED, asked, scaled, Y);
+    check_groups(&t, asked, Y, one);
     /* The products by columns: one of the vectors has many of them and the others few. */
     for (size_t k = 0; k < VECTORS * N; k++)
         if (k >= N && k % N % 97 != k / N) X[k] = 0;
@@ -190,6 +219,7 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     for (size_t v = 0; v < VECTORS; v++) {
         tiled_multiply_columns(&t, scaled + v * room, one);
         memcpy(Y + v * N, one, N * sizeof *Y);
+        check_columns_of(&t, asked, scaled + v * room, one);
     }
     check_against_double(N, K, X, Y);
     check_lanes(&t, VECTORS, scaled, lanes, 3);
