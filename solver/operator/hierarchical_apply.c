@@ -258,19 +258,20 @@ static void answer_some(areas *a, hierarchical_some *some, size_t n_selected, co
     const size_t n = self->base.n, c = h->c;
     const float *left = self->left_of_element + c * n,
                 *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
-    const bool few = hierarchical_some_light(some, h->E, h->H0);
-    float factor;
-    if (few && some->lit.n_steps == 0) { /* no light at all */
+    const bool known = hierarchical_some_light(some, h->E, h->H0);
+    float factor = 0;
+    if (some->extent == LIT_NOWHERE) {
         for (size_t r = 0; r < n_selected; r++) h->out[r] = answer_of(h, selected[r], 0);
         return;
     }
-    if (few) {
-        factor = hierarchical_some_forward(some, c, h->E, h->H0, h->X, a->from, a->slots);
+    if (some->extent == LIT_FEW) {
+        if (!known) hierarchical_some_forward(some, c, h->E, h->H0, h->X, a->from, a->slots);
+        if (lift != NULL) factor = (float)(some->sum / self->even.light[c]);
     } else {
-        analyse(a);
+        if (!known) analyse(a);
         factor = mean_factor(h);
     }
-    hierarchical_some_multiply(some, c, few, a->from, a->to);
+    hierarchical_some_multiply(some, c, a->from, a->to);
     wavelet_plan_inverse_some(&self->plan, some->asked.n_steps, some->asked.steps, a->to, h->X, a->slots);
     for (size_t r = 0; r < n_selected; r++) {
         const size_t i = selected[r], p = operator_position(&self->base, i);
@@ -289,8 +290,8 @@ bool hierarchical_answer_selected(const lam_operator *op, size_t n_rhs, const op
     if (!hierarchical_some_ask(&some, n_selected, selected,
                                n_rhs >= WIDE_WORTH ? SOME_STEPS_WIDE : SOME_STEPS))
         return false;
-    for (size_t c = 0; c < op->n_channels; c++)
-        for (size_t v = 0; v < n_rhs; v++) {
+    for (size_t v = 0; v < n_rhs; v++)
+        for (size_t c = 0; c < op->n_channels; c++) {
             set_vector(&a.h, c, &vectors[v]);
             a.h.out = vectors[v].out + c * n_selected;
             answer_some(&a, &some, n_selected, selected);

@@ -18,6 +18,7 @@ bool hierarchical_some_add(const hierarchical *self, size_t *total) {
                             groups,
                             plan->n_used + TILED_PAST,
                             wavelet_marks_words(plan) * sizeof(uint64_t),
+                            wavelet_marks_words(plan) * sizeof(uint64_t),
                             plan->n_steps};
     for (size_t k = 0; k < sizeof parts / sizeof *parts; k++)
         if (!work_area_add(total, parts[k])) return false;
@@ -38,6 +39,7 @@ hierarchical_some hierarchical_some_take(const hierarchical *self, void **work) 
     some.lit = take_part(self, work);
     some.wanted = work_area_take(work, plan->n_used + TILED_PAST);
     some.marks = work_area_take(work, wavelet_marks_words(plan) * sizeof *some.marks);
+    some.lit_at = work_area_take(work, wavelet_marks_words(plan) * sizeof *some.lit_at);
     some.flags = work_area_take(work, plan->n_steps);
     memset(some.flags, 0, plan->n_steps);
     return some;
@@ -91,8 +93,10 @@ static size_t mark_light(const hierarchical_some *some, const float *E, const fl
     return found;
 }
 
-bool hierarchical_some_light(hierarchical_some *some, const float *E, const float *H0) {
-    const size_t n = some->self->base.n, most = n / LIT_SHARE;
+/* Finds the part of the light, unless it is the one that is known. */
+static hierarchical_extent find_light(hierarchical_some *some, const float *E, const float *H0) {
+    const size_t n = some->self->base.n, most = n / LIT_SHARE,
+                 bytes = wavelet_marks_words(&some->self->plan) * sizeof *some->marks;
     size_t found = 0;
     clear_marks(some);
     for (size_t first = 0; first < n && found <= most; first += LOOKED_AT) {
@@ -101,13 +105,24 @@ bool hierarchical_some_light(hierarchical_some *some, const float *E, const floa
             (H0 != NULL && !wavelet_is_dark(H0 + first, last - first)))
             found += mark_light(some, E, H0, first, last);
     }
-    if (found > most) return false;
+    if (found > most) return LIT_MANY;
+    if (found == 0) return LIT_NOWHERE;
+    if (some->knows_lit && memcmp(some->marks, some->lit_at, bytes) == 0) return LIT_FEW;
     find_part(some, &some->lit);
-    return true;
+    memcpy(some->lit_at, some->marks, bytes);
+    some->knows_lit = true;
+    return LIT_FEW;
 }
 
-float hierarchical_some_forward(const hierarchical_some *some, size_t c, const float *E, const float *H0,
-                                float *X, float *C, float *work) {
+bool hierarchical_some_light(hierarchical_some *some, const float *E, const float *H0) {
+    if (H0 == NULL && some->E != NULL && memcmp(some->E, E, some->self->base.n * sizeof *E) == 0) return true;
+    some->extent = find_light(some, E, H0);
+    some->E = H0 == NULL ? E : NULL;
+    return false;
+}
+
+void hierarchical_some_forward(hierarchical_some *some, size_t c, const float *E, const float *H0, float *X,
+                               float *C, float *work) {
     const hierarchical *self = some->self;
     const wavelet_plan *plan = &self->plan;
     const float *rho = self->base.reflectance + c * self->base.n, *root = self->root_area;
@@ -133,17 +148,17 @@ float hierarchical_some_forward(const hierarchical_some *some, size_t c, const f
     }
     wavelet_plan_forward_some(plan, some->lit.n_steps, some->lit.steps, X, self->K[self->of_channel[c]].step,
                               C, work);
-    return corrected ? (float)((sum + mean_correction_total(parts)) / self->even.light[c]) : 0;
+    some->sum = sum + mean_correction_total(parts);
 }
 
-void hierarchical_some_multiply(const hierarchical_some *some, size_t c, bool lit, const float *C,
-                                float *to) {
+void hierarchical_some_multiply(const hierarchical_some *some, size_t c, const float *C, float *to) {
     const tiled_rows *K = &some->self->K[some->self->of_channel[c]];
-    const hierarchical_part *light = &some->lit, *asked = &some->asked;
-    if (lit && tiled_few_columns_of(K, light->n_groups, light->groups, C))
-        tiled_multiply_columns_of(K, light->n_groups, light->groups, asked->n_groups, asked->groups,
-                                  some->wanted, C, to);
-    else if (!lit && tiled_few_columns(K, C))
+    const hierarchical_part *lit = &some->lit, *asked = &some->asked;
+    const bool few = some->extent == LIT_FEW;
+    if (few && tiled_few_columns_of(K, lit->n_groups, lit->groups, C))
+        tiled_multiply_columns_of(K, lit->n_groups, lit->groups, asked->n_groups, asked->groups, some->wanted,
+                                  C, to);
+    else if (!few && tiled_few_columns(K, C))
         tiled_multiply_columns(K, C, to);
     else
         tiled_multiply_rows(K, asked->n_groups, asked->groups, C, to);

@@ -12,13 +12,21 @@ typedef struct hierarchical_part {
     uint32_t *groups; /* [self->n_groups], of K: the coefficients of these steps */
 } hierarchical_part;
 
-/* The elements asked, and those that are lit. */
+/* The extent of the light of a channel; of few elements the part is known. */
+typedef enum hierarchical_extent { LIT_NOWHERE, LIT_FEW, LIT_MANY } hierarchical_extent;
+
+/* The elements asked, and those that are lit by the light whose coefficients were made last. */
 typedef struct hierarchical_some {
     const hierarchical *self;
     hierarchical_part asked, lit;
-    uint8_t *wanted; /* [n_used + TILED_PAST], 1 for the first coefficient of the groups asked */
-    uint64_t *marks; /* work, of positions */
-    uint8_t *flags;  /* [plan.n_steps], work, 0 */
+    const float *E; /* [n], that light, which must not have changed; NULL: nothing is known of it */
+    hierarchical_extent extent;
+    double sum;       /* of its areas times light, where few elements are lit */
+    bool knows_lit;   /* lit is that of the marks lit_at */
+    uint8_t *wanted;  /* [n_used + TILED_PAST], 1 for the first coefficient of the groups asked */
+    uint64_t *marks;  /* work, of positions */
+    uint64_t *lit_at; /* marks */
+    uint8_t *flags;   /* [plan.n_steps], work, 0 */
 } hierarchical_some;
 
 /* Bytes of the parts of a work area; false when *total overflows. */
@@ -30,16 +38,17 @@ hierarchical_some hierarchical_some_take(const hierarchical *self, void **work);
 bool hierarchical_some_ask(hierarchical_some *some, size_t n_selected, const uint32_t *selected,
                            size_t share);
 
-/* Finds what light E + rho H0 [n] of a channel needs, in mesh order; H0 may be NULL. False where too many
- * elements are lit for this to pay. */
+/* True where light E + rho H0 [n] of a channel, in mesh order, H0 may be NULL, is that whose coefficients
+ * were made last, which are those of any channel. Mostly channels emit alike. Else its extent is found, with
+ * the part of few elements. */
 bool hierarchical_some_light(hierarchical_some *some, const float *E, const float *H0);
 
-/* The light's coefficients, times their steps: C [n_used], with the numbers of a transform of all of X [n],
- * of which only lit leaves are written. Returns the factor of the correction of the mean error. */
-float hierarchical_some_forward(const hierarchical_some *some, size_t c, const float *E, const float *H0,
-                                float *X, float *C, float *work);
+/* The coefficients of such light of few elements, times their steps: C [n_used], with the numbers of a
+ * transform of all of X [n], of which only lit leaves are written. */
+void hierarchical_some_forward(hierarchical_some *some, size_t c, const float *E, const float *H0, float *X,
+                               float *C, float *work);
 
-/* The rows asked of K_c C, with the bits of a whole product. lit: the light was found. */
-void hierarchical_some_multiply(const hierarchical_some *some, size_t c, bool lit, const float *C, float *to);
+/* The rows asked of K_c C, with the bits of a whole product. */
+void hierarchical_some_multiply(const hierarchical_some *some, size_t c, const float *C, float *to);
 
 #endif

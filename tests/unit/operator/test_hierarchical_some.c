@@ -169,6 +169,7 @@ START_TEST(parts_are_small) {
     ck_assert(hierarchical_some_add(self, &bytes));
     void *work = test_allocate(1, bytes), *rest = work_area_begin(work);
     float *E = test_allocate(CHANNELS * N, sizeof *E), *X = test_allocate(N, sizeof *X),
+          *other = test_allocate(CHANNELS * N, sizeof *other),
           *C = test_allocate(self->plan.n_used + TILED_PAST, sizeof *C),
           *slots = test_allocate(wavelet_plan_work(&self->plan), sizeof *slots);
     uint32_t *selected = test_allocate(N, sizeof *selected);
@@ -182,17 +183,20 @@ START_TEST(parts_are_small) {
     choose(3, selected);
     ck_assert(!hierarchical_some_ask(&some, counts[3], selected, 2));
     light(1, E);
-    ck_assert(hierarchical_some_light(&some, E, NULL));
+    ck_assert(!hierarchical_some_light(&some, E, NULL) && some.extent == LIT_FEW);
     ck_assert_uint_lt(some.lit.n_steps * 15, self->plan.n_steps);
-    ck_assert(hierarchical_some_forward(&some, 0, E, NULL, X, C, slots) == 0); /* nothing is corrected */
+    hierarchical_some_forward(&some, 0, E, NULL, X, C, slots);
     ck_assert(tiled_few_columns_of(&self->K[0], some.lit.n_groups, some.lit.groups, C));
-    light(2, E);
-    ck_assert(!hierarchical_some_light(&some, E, NULL));
+    ck_assert(hierarchical_some_light(&some, E + N, NULL)); /* the second channel is lit alike */
+    light(2, other);
+    ck_assert(!hierarchical_some_light(&some, other, NULL) && some.extent == LIT_MANY);
     light(3, E);
-    ck_assert(hierarchical_some_light(&some, E, NULL) && some.lit.n_steps == 0);
+    ck_assert(!hierarchical_some_light(&some, E, NULL) && some.extent == LIT_NOWHERE);
+    ck_assert(!hierarchical_some_light(&some, E, other) && some.extent == LIT_MANY);
     lam_operator_close(op);
     free(E);
     free(X);
+    free(other);
     free(C);
     free(slots);
     free(selected);
