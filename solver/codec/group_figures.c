@@ -123,14 +123,16 @@ bool reduce_vectors(const reduce_request *r, const group_index *groups, const do
                     size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures) {
     size_t n_values = groups->start[groups->n_groups];
     uint32_t *begin = x.whole ? NULL : places_of_groups(r, groups, &n_values);
+    unsigned asked = 0;
     if (begin == NULL && !x.whole) return false;
+    for (size_t s = 0; s < r->n_with; s++) asked |= 1u << r->with[s];
     for (size_t v = 0; v < count; v++)
         for (size_t c = 0; c < n_channels; c++)
             for (size_t k = 0; k < r->n_names; k++) {
                 double of_name[REDUCE_COUNT];
                 const reduce_name *name = &r->names[k];
                 const value_row row = {begin, x, (v * n_channels + c) * n_values};
-                group_statistics(name->n_groups, name->groups, groups, area, &row, of_name);
+                group_statistics(name->n_groups, name->groups, groups, area, &row, asked, of_name);
                 for (size_t s = 0; s < r->n_with; s++)
                     *reduce_figure(r, k, s, n_rhs, first + v, n_channels, c, figures) =
                         r->with[s] == REDUCE_SHARE

@@ -40,12 +40,16 @@ typedef struct value_row {
     size_t first;
 } value_row;
 
-/* Every statistic of the elements of some groups; area [n] in mesh order, or NULL for 1 of each. NaN where
- * one has no value: no area, a mean of 0. */
-void group_statistics(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
-                      const value_row *row, double out[REDUCE_COUNT]);
+/* The bit of a statistic, by its name without REDUCE_. */
+#define REDUCE_BIT(name) (1u << REDUCE_##name)
 
-/* The same of x [n] in mesh order. */
+/* The statistics asked (REDUCE_BIT) of the elements of some groups; area [n] in mesh order, or NULL for 1 of
+ * each. NaN where one has no value, of no area or a mean of 0, and where it is not asked. Cost: a pass over
+ * the values, one for sums and one for the variance, where they are needed. */
+void group_statistics(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
+                      const value_row *row, unsigned asked, double out[REDUCE_COUNT]);
+
+/* Every statistic of x [n] in mesh order. */
 void reduce_groups(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
                    reduce_values x, double out[REDUCE_COUNT]);
 
