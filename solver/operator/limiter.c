@@ -37,13 +37,19 @@ size_t lam_limiter_work_bytes(const lam_limiter *l) {
     return total;
 }
 
+/* True where the light of a row is negative somewhere. */
+typedef enum signs { UNKNOWN_YET, NOWHERE, SOMEWHERE } signs;
+
 /* One row: of a vector and a channel. */
 typedef struct row {
     const lam_limiter *l;
     lam_quantity quantity;
     const float *rho, *E, *H0; /* [n]; E and H0 NULL: 0 */
-    const uint32_t *where;     /* [n], element -> place in out; NULL: mesh order */
+    const float *W;            /* [s], of emitters; NULL: none */
+    size_t s;
+    const uint32_t *where; /* [n], element -> place in out, of those that are there; NULL: mesh order */
     float *out;
+    signs signs;
 } row;
 
 /* The part of the answer that is not reflected. */
@@ -103,6 +109,15 @@ static bool any_negative(const float *x, size_t count) {
     int found = 0;
     for (size_t i = 0; x != NULL && i < count; i++) found |= x[i] < 0.0f;
     return found != 0;
+}
+
+/* Looks once, as this reads the light of all elements. */
+static bool has_signs(row *r) {
+    const size_t n = r->l->n;
+    if (r->signs == UNKNOWN_YET)
+        r->signs =
+            any_negative(r->E, n) || any_negative(r->H0, n) || any_negative(r->W, r->s) ? SOMEWHERE : NOWHERE;
+    return r->signs == SOMEWHERE;
 }
 
 /* A group under way. */
@@ -226,7 +241,7 @@ static void lower_blocks(const void *job, size_t thread, size_t first, size_t la
 enum { THREADS_WORTH = 65536, AT_ONCE = 128 };
 
 /* Limits one group; returns the elements that were below zero. */
-static size_t limit_group(const row *r, size_t n_threads, size_t g, block *blocks) {
+static size_t limit_group(row *r, size_t n_threads, size_t g, block *blocks) {
     const lam_limiter *l = r->l;
     const group_work w = {r, l->elements + l->start[g], l->start[g + 1] - l->start[g], blocks};
     const size_t n_blocks = blocks_of(w.count), threads = w.count >= THREADS_WORTH ? n_threads : 1;
@@ -237,7 +252,7 @@ static size_t limit_group(const row *r, size_t n_threads, size_t g, block *block
         negative += blocks[k].negative;
         finite = finite && isfinite(blocks[k].sum);
     }
-    if (negative == 0 || !finite) return 0;
+    if (negative == 0 || !finite || has_signs(r)) return 0;
     add_up(blocks, 0, n_blocks);
     hand_down(blocks, 0, n_blocks, node_sum(blocks, 0, n_blocks) > 0 ? 1 : 0);
     parallel_share(threads, n_blocks, AT_ONCE, lower_blocks, &w);
@@ -245,7 +260,7 @@ static size_t limit_group(const row *r, size_t n_threads, size_t g, block *block
 }
 
 /* Limits a row of all elements, or of the groups that are touched. */
-static size_t limit_row(const row *r, size_t n_threads, const uint8_t *touched, block *blocks) {
+static size_t limit_row(row *r, size_t n_threads, const uint8_t *touched, block *blocks) {
     size_t negative = 0;
     for (size_t g = 0; g < r->l->n_groups; g++)
         if ((touched == NULL || touched[g]) && r->l->start[g] < r->l->start[g + 1])
@@ -262,8 +277,9 @@ void limiter_limit(const lam_limiter *l, const lam_operator *op, size_t n_rhs, l
     block *blocks = work_area_take(&rest, blocks_of(l->most) * sizeof *blocks);
     uint32_t *where = selected != NULL ? work_area_take(&rest, n * sizeof *where) : NULL;
     uint8_t *touched = selected != NULL ? work_area_take(&rest, l->n_groups) : NULL;
-    if (selected != NULL) {
-        memset(where, 0xff, n * sizeof *where);
+    if (selected != NULL) { /* a place of its groups' first elements says of each group whether it is there */
+        for (size_t g = 0; g < l->n_groups; g++)
+            if (l->start[g] < l->start[g + 1]) where[l->elements[l->start[g]]] = UINT32_MAX;
         for (size_t k = 0; k < n_selected; k++) where[selected[k]] = (uint32_t)k;
         for (size_t g = 0; g < l->n_groups; g++)
             touched[g] = l->start[g] < l->start[g + 1] && where[l->elements[l->start[g]]] != UINT32_MAX;
@@ -271,17 +287,16 @@ void limiter_limit(const lam_limiter *l, const lam_operator *op, size_t n_rhs, l
     for (size_t v = 0; v < n_rhs; v++) {
         size_t negative = 0;
         for (size_t at = v * C; at < (v + 1) * C; at++) {
-            const row r = {.l = l,
-                           .quantity = quantity,
-                           .rho = op->reflectance + at % C * n,
-                           .E = light->E != NULL ? light->E + at * n : NULL,
-                           .H0 = light->H0 != NULL ? light->H0 + at * n : NULL,
-                           .where = where,
-                           .out = out + at * width};
-            if (selected == NULL && !any_below(&r, 0, n)) continue;
-            if (any_negative(r.E, n) || any_negative(r.H0, n) ||
-                any_negative(light->W != NULL ? light->W + at * s : NULL, s))
-                continue;
+            row r = {.l = l,
+                     .quantity = quantity,
+                     .rho = op->reflectance + at % C * n,
+                     .E = light->E != NULL ? light->E + at * n : NULL,
+                     .H0 = light->H0 != NULL ? light->H0 + at * n : NULL,
+                     .W = light->W != NULL ? light->W + at * s : NULL,
+                     .s = s,
+                     .where = where,
+                     .out = out + at * width};
+            if (selected == NULL && (!any_below(&r, 0, n) || has_signs(&r))) continue;
             negative += limit_row(&r, op->n_threads, touched, blocks);
         }
         if (limited != NULL) limited[v] = negative;
