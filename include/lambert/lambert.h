@@ -93,8 +93,10 @@ lam_status lam_operator_apply_lit(const lam_operator *op, size_t n_rhs, lam_quan
 
 /* The same for some elements only, of which no other row is computed: out is [n_rhs][C][n_selected], in the
  * order of selected, which may name an element twice; bit for bit what the whole answer has there. E and H0
- * are whole. Cost: O((n + n_selected) k) per vector for a low-rank operator, less where E is sparse. Errors:
- * also LAM_ERR_ARGUMENT for an element that is not below n. */
+ * are whole. Cost: O((n + n_selected) k) per vector for a low-rank operator, less where E is sparse; for a
+ * hierarchical one that of the parts of its tree above the elements selected and those lit, about a quarter
+ * of the whole answer where either is one group of nine. Errors: also LAM_ERR_ARGUMENT for an element that is
+ * not below n. */
 lam_status lam_operator_apply_selected(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
                                        const float *E, const float *H0, size_t n_selected,
                                        const uint32_t *selected, float *out, void *work, size_t work_bytes,
