@@ -14,8 +14,8 @@
 /* Bytes that can be read behind the end of the file. */
 #define STORE_MAP_SLACK 64
 
-/* Smaller arrays are read: reading and checking one takes well below a millisecond. */
-#define STORE_MAP_LEAST ((size_t)1 << 20)
+/* Smaller arrays are read: they hardly count. */
+#define STORE_MAP_LEAST ((size_t)64 << 10)
 
 typedef struct store_map store_map;
 

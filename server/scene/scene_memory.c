@@ -78,7 +78,7 @@ lam_status scene_memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes,
     TRY(bytes_below(s, STORE_SENSORS, &sensors, error));
     TRY(bytes_below(s, STORE_ERROR, &errors, error));
     TRY(store_get_text(s, STORE_OPERATOR, "kind", &kind, error));
-    *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky + luminaires + luminaire_names_memory(s) +
+    *memory = operator_memory(s, kind, *operator_bytes) + sky + luminaires + luminaire_names_memory(s) +
               sensors + sensor_names_memory(s) + errors + mesh_memory(s);
 done:
     free(kind);

@@ -8,6 +8,7 @@
 #include "solver/base/parallel.h"
 #include "store/status.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,15 +31,20 @@ enum { FOURS_PAST = 1 };
 enum { AHEAD = 3072, CACHED = 8 << 20 };
 
 static size_t bytes_ahead(const tiled_rows *t) {
-    return t->begin[t->n_groups * t->n_planes] * sizeof *t->fours > CACHED ? AHEAD : 0;
+    return t->n_fours * sizeof *t->fours > CACHED ? AHEAD : 0;
+}
+
+void tiled_rest(tiled_rows *t) {
+    free(t->first);
+    free(t->step);
+    t->first = NULL;
+    t->step = NULL;
 }
 
 void tiled_free(tiled_rows *t) {
-    free(t->first);
-    free(t->group_of);
-    free(t->step);
-    free(t->begin);
-    free(t->fours);
+    tiled_rest(t);
+    store_view_free(&t->begins);
+    store_view_free(&t->values);
     *t = (tiled_rows){.n = 0};
 }
 
@@ -107,39 +113,51 @@ static size_t pack(const tiled_rows *t, const tile_matrix *m, size_t plane, cons
 
 /* The fours of groups of rows: their numbers where fours is NULL, else themselves. */
 typedef struct packing {
-    tiled_rows *t;
+    const tiled_rows *t;
     const tile_matrix *m;
     const plane_rows *rows;
+    uint64_t *begin; /* [n_groups n_planes + 1] */
     tile_four *fours;
 } packing;
 
 static void pack_groups(const void *job, size_t thread, size_t first, size_t last) {
     const packing *p = job;
-    tiled_rows *t = p->t;
+    const tiled_rows *t = p->t;
     (void)thread;
     for (size_t g = first; g < last; g++)
         for (size_t d = 0; d < t->n_planes; d++) {
             const size_t part = tiled_part(t, g, d);
             if (p->fours != NULL)
-                pack(t, p->m, d, &p->rows[d], g, p->fours + t->begin[part]);
+                pack(t, p->m, d, &p->rows[d], g, p->fours + p->begin[part]);
             else
-                t->begin[part + 1] = pack(t, p->m, d, &p->rows[d], g, NULL);
+                p->begin[part + 1] = pack(t, p->m, d, &p->rows[d], g, NULL);
         }
 }
 
 static lam_status make_fours(tiled_rows *t, const tile_matrix *m, lam_error *error) {
     lam_status status = LAM_OK;
+    const size_t n_parts = t->n_groups * t->n_planes;
     plane_rows rows[TILE_PLANES] = {{NULL, NULL}};
-    for (size_t d = 0; d < t->n_planes; d++) TRY(sort_plane(m, d, t->n_groups, &rows[d], error));
+    uint32_t *narrow = NULL;
     packing p = {.t = t, .m = m, .rows = rows};
+    for (size_t d = 0; d < t->n_planes; d++) TRY(sort_plane(m, d, t->n_groups, &rows[d], error));
+    p.begin = memory_allocate(n_parts + 1, sizeof *p.begin, "operator", error);
+    narrow = t->begins.memory = memory_allocate(n_parts + 1, sizeof *narrow, "operator", error);
+    if (p.begin == NULL || narrow == NULL) TRY(LAM_ERR_MEMORY);
     parallel_share(parallel_threads(), t->n_groups, GROUPS_AT_ONCE, pack_groups, &p);
-    for (size_t k = 0; k < t->n_groups * t->n_planes; k++) t->begin[k + 1] += t->begin[k];
-    t->fours = memory_allocate((size_t)t->begin[t->n_groups * t->n_planes] + FOURS_PAST, sizeof *t->fours,
-                               "operator", error);
-    if (t->fours == NULL) TRY(LAM_ERR_MEMORY);
-    p.fours = t->fours;
+    for (size_t k = 0; k < n_parts; k++) p.begin[k + 1] += p.begin[k];
+    if (p.begin[n_parts] > UINT32_MAX)
+        FAIL(error, LAM_ERR_MEMORY, "operator: %llu fours of tiles, at most %u can be kept",
+             (unsigned long long)p.begin[n_parts], (unsigned)UINT32_MAX);
+    for (size_t k = 0; k <= n_parts; k++) narrow[k] = (uint32_t)p.begin[k];
+    t->n_fours = narrow[n_parts];
+    p.fours = t->values.memory = memory_allocate(t->n_fours + FOURS_PAST, sizeof *p.fours, "operator", error);
+    if (p.fours == NULL) TRY(LAM_ERR_MEMORY);
     parallel_share(parallel_threads(), t->n_groups, GROUPS_AT_ONCE, pack_groups, &p);
+    t->begin = t->begins.data = narrow;
+    t->fours = t->values.data = p.fours;
 done:
+    free(p.begin);
     for (size_t d = 0; d < TILE_PLANES; d++) {
         free(rows[d].begin);
         free(rows[d].at);
@@ -147,63 +165,40 @@ done:
     return status;
 }
 
+lam_status tiled_set_rows(tiled_rows *t, const tile_group *groups, const float *step, lam_error *error) {
+    lam_status status = LAM_OK;
+    uint32_t *first = memory_allocate(t->n_groups + 1, sizeof *first, "operator", error);
+    float *steps = memory_allocate(t->n + TILED_PAST, sizeof *steps, "operator", error);
+    if (first == NULL || steps == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0; g < t->n_groups; g++) {
+        first[g + 1] = first[g] + groups[g].size;
+        assert(first[g + 1] <= t->n);
+        for (size_t i = first[g]; i < first[g + 1]; i++) steps[i] = step[g];
+    }
+    tiled_rest(t);
+    t->first = first;
+    t->step = steps;
+    first = NULL;
+    steps = NULL;
+done:
+    free(first);
+    free(steps);
+    return status;
+}
+
 lam_status tiled_create(const tile_matrix *upper, size_t n_groups, const tile_group *groups,
                         const float *step, tiled_rows *out, lam_error *error) {
     lam_status status = LAM_OK;
-    tiled_rows made = {.n_groups = n_groups, .n_planes = 1};
+    tiled_rows made = {.n_groups = n_groups, .n_planes = 1, .n_numbers = tile_matrix_numbers(upper)};
     for (size_t g = 0; g < n_groups; g++) made.n += groups[g].size;
     for (size_t d = 0; d < TILE_PLANES; d++)
         if (upper->count[d] > 0) made.n_planes = d + 1;
-    made.first = memory_allocate(n_groups + 1, sizeof *made.first, "operator", error);
-    made.group_of = memory_allocate(made.n, sizeof *made.group_of, "operator", error);
-    made.step = memory_allocate(made.n + TILED_PAST, sizeof *made.step, "operator", error);
-    made.begin = memory_allocate(n_groups * made.n_planes + 1, sizeof *made.begin, "operator", error);
-    if (made.first == NULL || made.group_of == NULL || made.step == NULL || made.begin == NULL)
-        TRY(LAM_ERR_MEMORY);
-    for (size_t g = 0; g < n_groups; g++) {
-        made.first[g + 1] = made.first[g] + groups[g].size;
-        for (size_t i = made.first[g]; i < made.first[g + 1]; i++) {
-            made.group_of[i] = (uint32_t)g;
-            made.step[i] = step[g];
-        }
-    }
+    TRY(tiled_set_rows(&made, groups, step, error));
     TRY(make_fours(&made, upper, error));
     *out = made;
     made = (tiled_rows){.n = 0};
 done:
     tiled_free(&made);
-    return status;
-}
-
-/* Tile t of a four, of a group of rows; false where the four has fewer. */
-static bool tile_of(const tiled_rows *t, const tile_four *four, size_t group, size_t k, tile_digits *out) {
-    bool any = false;
-    *out = (tile_digits){.row = (uint32_t)group, .column = t->group_of[four->base + four->beyond[k]]};
-    for (size_t r = 0; r < TILE; r++)
-        for (size_t c = 0; c < TILE; c++) {
-            out->values[r][c] = four->values[r][k * TILE + c];
-            any = any || out->values[r][c] != 0;
-        }
-    return any;
-}
-
-lam_status tiled_upper(const tiled_rows *t, tile_matrix *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    tile_matrix made = {.count = {0}};
-    size_t room[TILE_PLANES] = {0};
-    tile_digits found;
-    for (size_t d = 0; d < t->n_planes; d++)
-        for (size_t g = 0; g < t->n_groups; g++) {
-            const size_t part = tiled_part(t, g, d);
-            for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++)
-                for (size_t k = 0; k < TILES_AT_ONCE; k++)
-                    if (tile_of(t, &t->fours[f], g, k, &found) && found.column >= g)
-                        TRY(tile_matrix_append(&made, d, &found, room, error));
-        }
-    *out = made;
-    made = (tile_matrix){.count = {0}};
-done:
-    tile_matrix_free(&made);
     return status;
 }
 
@@ -232,11 +227,11 @@ static void group_portable(const tiled_rows *t, size_t g, const float *x, float 
     float sums[TILE][TILE_LANES] = {{0}};
     for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
         for (size_t l = 0; l < TILE * TILE_LANES; l++) sums[l / TILE_LANES][l % TILE_LANES] *= TILED_RADIX;
-        for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++)
+        for (size_t f = tiled_begin(t, part), end = tiled_begin(t, part + 1); f < end; f++)
             for (size_t r = 0; r < TILE; r++)
                 for (size_t l = 0; l < TILE_LANES; l++)
                     sums[r][l] += (float)t->fours[f].values[r][l] *
-                                  x[t->fours[f].base + t->fours[f].beyond[l / TILE] + l % TILE];
+                                  x[tiled_column(t, &t->fours[f], l / TILE) + l % TILE];
     }
     for (size_t r = 0, i = t->first[g]; i < t->first[g + 1]; r++, i++)
         y[i] = t->step[i] * sum_of_lanes(sums[r]);
@@ -313,9 +308,9 @@ CPU_AVX2_TARGET static void group_avx2(const tiled_rows *t, size_t g, const floa
             low[r] = _mm256_mul_ps(low[r], _mm256_set1_ps(TILED_RADIX));
             high[r] = _mm_mul_ps(high[r], _mm_set1_ps(TILED_RADIX));
         }
-        for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++) {
+        for (size_t f = tiled_begin(t, part), end = tiled_begin(t, part + 1); f < end; f++) {
             const tile_four *four = &t->fours[f];
-            const float *from = x + four->base;
+            const float *from = x + tiled_base(t, four);
             _mm_prefetch((const char *)four + ahead, _MM_HINT_T0);
             const __m256 a = _mm256_loadu2_m128(from + four->beyond[1], from + four->beyond[0]);
             const __m256 b = _mm256_loadu2_m128(from + four->beyond[3], from + four->beyond[2]);
@@ -347,9 +342,9 @@ CPU_AVX512_TARGET static void group_avx512(const tiled_rows *t, size_t g, const 
     __m512 lanes[TILE] = {_mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps()};
     for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
         for (size_t r = 0; r < TILE; r++) lanes[r] = _mm512_mul_ps(lanes[r], _mm512_set1_ps(TILED_RADIX));
-        for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++) {
+        for (size_t f = tiled_begin(t, part), end = tiled_begin(t, part + 1); f < end; f++) {
             const tile_four *four = &t->fours[f];
-            const float *from = x + four->base;
+            const float *from = x + tiled_base(t, four);
             _mm_prefetch((const char *)four + ahead, _MM_HINT_T0);
             const __m256 a = _mm256_loadu2_m128(from + four->beyond[1], from + four->beyond[0]);
             const __m256 b = _mm256_loadu2_m128(from + four->beyond[3], from + four->beyond[2]);
@@ -395,7 +390,7 @@ static void multiply_groups(const void *job, size_t thread, size_t first, size_t
 
 void tiled_multiply(const tiled_rows *t, const float *scaled, float *y, size_t n_threads) {
     const product p = {t, kernels_of[cpu_best()], scaled, y};
-    const bool many = t->begin[t->n_groups * t->n_planes] * TILE * TILE_LANES > THREADS_WORTH;
+    const bool many = t->n_fours * TILE * TILE_LANES > THREADS_WORTH;
     parallel_share(many ? n_threads : 1, t->n_groups, GROUPS_AT_ONCE, multiply_groups, &p);
 }
 
@@ -412,12 +407,12 @@ static bool is_dark(const tiled_rows *t, size_t g, const float *scaled) {
 }
 
 uint64_t tiled_few(const tiled_rows *t) {
-    return t->begin[t->n_groups * t->n_planes] / COLUMNS_SHARE;
+    return t->n_fours / COLUMNS_SHARE;
 }
 
 /* Adds the fours of the columns of a group to *met, unless X is 0 there. */
 static void meet(const tiled_rows *t, size_t g, const float *scaled, uint64_t *met) {
-    if (!is_dark(t, g, scaled)) *met += t->begin[(g + 1) * t->n_planes] - t->begin[g * t->n_planes];
+    if (!is_dark(t, g, scaled)) *met += tiled_begin(t, (g + 1) * t->n_planes) - tiled_begin(t, g * t->n_planes);
 }
 
 bool tiled_few_columns(const tiled_rows *t, const float *scaled) {
@@ -462,6 +457,6 @@ void tiled_multiply_columns_of(const tiled_rows *t, size_t n_lit, const uint32_t
 
 size_t tiled_bytes(const tiled_rows *t) {
     const size_t parts = t->n_groups * t->n_planes;
-    return (size_t)t->begin[parts] * sizeof *t->fours + parts * sizeof *t->begin + t->n * sizeof *t->step +
+    return t->n_fours * sizeof *t->fours + parts * sizeof *t->begin + t->n * sizeof *t->step +
            t->n_groups * sizeof *t->first;
 }

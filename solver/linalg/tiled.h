@@ -4,6 +4,7 @@
 #define LAMBERT_LINALG_TILED_H
 
 #include "solver/linalg/tiles.h"
+#include "store/store_map.h"
 
 #include <stdbool.h>
 
@@ -13,6 +14,10 @@ enum { TILES_AT_ONCE = 4, TILE_LANES = TILE * TILES_AT_ONCE };
  * a plane is worth in the next lower one. */
 enum { TILED_PAST = 8, TILED_WIDE = 16, TILED_RADIX = 256 };
 
+/* Numbers behind n that tiled_multiply may read of a vector where tiles were changed in a mapped file, beside
+ * which nothing is read or written then: their columns are not looked at one by one there. */
+enum { TILED_BEYOND = UINT16_MAX + 1 + TILED_PAST };
+
 /* Four tiles of a group of rows: tile t begins at column base + beyond[t]; row r of all four side by side. */
 typedef struct tile_four {
     uint32_t base;
@@ -21,13 +26,14 @@ typedef struct tile_four {
 } tile_four;
 
 typedef struct tiled_rows {
-    size_t n, n_groups, n_planes;
+    size_t n, n_groups, n_planes, n_fours;
     uint32_t *first; /* [n_groups + 1], rows of a group are first[g] to first[g + 1] - 1, and columns too */
-    uint32_t *group_of; /* [n], of a row */
-    float *step;        /* [n], of a row and of a column */
-    uint64_t *begin;    /* [n_groups n_planes + 1]: the fours of plane d of group g are
-                           begin[k] to begin[k + 1] - 1, k = (g + 1) n_planes - 1 - d: the highest plane first */
-    tile_four *fours;
+    float *step;     /* [n], of a row and of a column */
+    const uint32_t *begin;     /* [n_groups n_planes + 1]: the fours of plane d of group g are begin[k] to
+                                  begin[k + 1] - 1, k = (g + 1) n_planes - 1 - d: the highest plane first */
+    const tile_four *fours;    /* [n_fours] */
+    store_view begins, values; /* they hold begin and fours, which may be mapped: tiled_begin, tiled_base */
+    size_t n_numbers;          /* of the whole matrix that are not 0 */
 } tiled_rows;
 
 /* Rows are numbered anew, without those outside all groups: group g has those after group g - 1. Errors:
@@ -36,8 +42,34 @@ lam_status tiled_create(const tile_matrix *upper, size_t n_groups, const tile_gr
                         const float *step, tiled_rows *out, lam_error *error);
 void tiled_free(tiled_rows *t);
 
-/* The upper triangle again. Errors: LAM_ERR_MEMORY. */
-lam_status tiled_upper(const tiled_rows *t, tile_matrix *out, lam_error *error);
+/* Makes first and step of the n_groups groups, which have n rows in all; tiled_rest frees them. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status tiled_set_rows(tiled_rows *t, const tile_group *groups, const float *step, lam_error *error);
+void tiled_rest(tiled_rows *t);
+
+/* GROUP/begin [n_groups n_planes + 1] u32, four [n_fours][sizeof(tile_four)] i8 and the attribute `numbers`
+ * of GROUP, as store/FORMAT.md says. tiled_load leaves them in place where the store is mapped, and first and
+ * step to tiled_set_rows. Errors: as store_write; as store_read_view, LAM_ERR_NUMERIC for a tile that cannot
+ * be. */
+lam_status tiled_save(const tiled_rows *t, const char *group, store *s, lam_error *error);
+lam_status tiled_load(store *s, const char *group, size_t n, size_t n_groups, tiled_rows *out,
+                      lam_error *error);
+
+/* Where a part of `begin` starts. A file that is changed while it is mapped leads nowhere else. */
+static inline size_t tiled_begin(const tiled_rows *t, size_t part) {
+    const size_t begin = t->begin[part];
+    return begin < t->n_fours ? begin : t->n_fours;
+}
+
+/* The base of a four, and the column of one of its tiles, likewise at most n. */
+static inline size_t tiled_base(const tiled_rows *t, const tile_four *four) {
+    return four->base < t->n ? four->base : t->n;
+}
+
+static inline size_t tiled_column(const tiled_rows *t, const tile_four *four, size_t k) {
+    const size_t column = (size_t)four->base + four->beyond[k];
+    return column < t->n ? column : t->n;
+}
 
 /* The part of `begin` that has a plane of a group. */
 static inline size_t tiled_part(const tiled_rows *t, size_t group, size_t plane) {
@@ -45,7 +77,8 @@ static inline size_t tiled_part(const tiled_rows *t, size_t group, size_t plane)
 }
 
 /* Vectors have room for TILED_PAST numbers behind n. Of a vector X a product takes `scaled`, step_i X_i, and
- * 0 behind them; the step of a row is in the product. */
+ * 0 behind them; the step of a row is in the product. Where begin and fours are mapped, the vector that
+ * tiled_multiply and tiled_multiply_rows take has room for TILED_BEYOND numbers, which need not be set. */
 
 /* y = A X. Every sum has one order, so that the bits do not depend on n_threads. */
 void tiled_multiply(const tiled_rows *t, const float *scaled, float *y, size_t n_threads);

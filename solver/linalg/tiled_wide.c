@@ -65,7 +65,7 @@ static void multiply_groups(const void *job, size_t thread, size_t first, size_t
 
 static void multiply_wide(const tiled_rows *t, const float *scaled, float *Y, size_t n_threads) {
     const product p = {t, wide[cpu_best()], scaled, Y};
-    const bool many = t->begin[t->n_groups * t->n_planes] > THREADS_WORTH;
+    const bool many = t->n_fours > THREADS_WORTH;
     parallel_share(many ? n_threads : 1, t->n_groups, GROUPS_AT_ONCE, multiply_groups, &p);
 }
 
@@ -86,7 +86,7 @@ static uint32_t find_few(const tiled_rows *t, size_t count, const float *scaled)
     uint64_t met[TILED_WIDE] = {0};
     uint32_t few = ((uint32_t)1 << count) - 1;
     for (size_t g = 0; g < t->n_groups && few != 0; g++) {
-        const uint64_t own = t->begin[(g + 1) * t->n_planes] - t->begin[g * t->n_planes];
+        const uint64_t own = tiled_begin(t, (g + 1) * t->n_planes) - tiled_begin(t, g * t->n_planes);
         for (uint32_t lit = lit_lanes(t, g, scaled) & few; lit != 0; lit &= lit - 1) {
             const int v = __builtin_ctz(lit);
             met[v] += own;

@@ -28,7 +28,7 @@ static bool overlap(const void *a, size_t a_bytes, const void *b, size_t b_bytes
     return first < second ? second - first < a_bytes : first - second < b_bytes;
 }
 
-/* n_out: numbers of out in a vector and a channel. */
+/* Checks arguments, and makes the operator ready. n_out: numbers of out in a vector and a channel. */
 static lam_status check_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *in,
                               size_t n_out, const float *out, const void *work, size_t work_bytes,
                               lam_error *error) {
@@ -60,6 +60,7 @@ static lam_status check_apply(const lam_operator *op, size_t n_rhs, lam_quantity
     if (overlap(in, bytes, out, out_bytes) || overlap(in, bytes, work, work_bytes) ||
         overlap(out, out_bytes, work, work_bytes))
         FAIL(error, LAM_ERR_ARGUMENT, "input, output and work area overlap");
+    TRY(operator_prepare(op, error));
 done:
     return status;
 }

@@ -21,17 +21,30 @@ typedef struct hierarchical_run {
     uint32_t element, count; /* the first, and how many */
 } hierarchical_run;
 
-/* A loaded operator. */
+/* The arrays of an operator in a store but for its tiles; they may be mapped. */
+typedef struct hierarchical_source {
+    bool ordered;
+    size_t n_groups;
+    store_view order, area, missing, light; /* area in mesh order; missing.data NULL: nothing is missing */
+    store_view rows, step;
+    wavelet_arrays basis;
+} hierarchical_source;
+
+/* The source of an operator of which much is made when it is first needed (operator_prepare). */
+typedef struct hierarchical_rest hierarchical_rest;
+
+/* A loaded operator. Pointers from `basis` on, and those in base.order, plan, even and first and step of K,
+ * may wait for operator_prepare; numbers do not. */
 typedef struct hierarchical {
     lam_operator base;
-    wavelets basis;
-    wavelet_plan plan; /* of the coefficients that any K has */
+    hierarchical_rest *rest; /* NULL: all is made */
     size_t n_groups;
+    size_t *of_channel; /* [C], the K of a channel: its own, or that of an earlier one which is alike */
+    tiled_rows *K;      /* [C]; empty where a channel has that of another */
+    wavelets basis;
+    wavelet_plan plan;      /* of the coefficients that any K has */
     tile_group *groups;     /* [n_groups], by number in the basis, all that the plan has */
     float *step;            /* [n_groups] */
-    size_t *of_channel;     /* [C], the K of a channel: its own, or that of an earlier one which is alike */
-    tiled_rows *K;          /* [C]; empty where a channel has that of another */
-    double n_numbers;       /* of all channels, both triangles */
     float *root_area;       /* [n] A^1/2, by position */
     float *left;            /* [C][n] rho' A^-1/2, by position */
     float *left_of_element; /* [C][n], the same in mesh order */
@@ -74,19 +87,39 @@ lam_status hierarchical_steps(const wavelets *basis, double threshold, float **o
 lam_status hierarchical_groups(const wavelet_plan *plan, const float *step, float least, size_t *n_groups,
                                tile_group **groups, float **group_step, lam_error *error);
 
-/* The tiles of a K are GROUP/count [planes][n_groups] u16 (u32 where a row has more than 65,535 tiles), tile
- * [tiles] u16, far u32, digit i8, as store/FORMAT.md says. Errors: as store_read; LAM_ERR_FORMAT where they
- * do not fit together, LAM_ERR_NUMERIC for a tile that cannot be. */
-lam_status hierarchical_save_tiles(const tile_matrix *m, size_t n_groups, const char *group, store *s,
-                                   lam_error *error);
+/* Sets the order of positions (NULL: mesh order) and areas [n], by position or in mesh order, which are
+ * copied. Errors: LAM_ERR_NUMERIC, LAM_ERR_MEMORY. */
+lam_status hierarchical_set_area(hierarchical *self, const uint32_t *order, const double *area,
+                                 bool by_position, lam_error *error);
+
+/* Makes the lift of the correction of the mean error. Errors: LAM_ERR_MEMORY. */
+lam_status hierarchical_lift(hierarchical *self, lam_error *error);
+
+/* Frees what hierarchical_make makes. */
+void hierarchical_unmake(hierarchical *self);
+
+/* Makes of its source all of an operator but K, and first and step of the K that it has. Errors: as
+ * operator_set_order, wavelets_make and mean_correction_create; LAM_ERR_NUMERIC for groups that cannot be. */
+lam_status hierarchical_make(hierarchical *self, const hierarchical_source *from, lam_error *error);
+
+/* The kind's memory (operator.h). */
+uint64_t hierarchical_memory(store *s, uint64_t stored);
+
+/* Reads an operator of a store; where that is mapped, much of it is only checked, and made by
+ * hierarchical_prepare. Errors: as store_read_view and hierarchical_make. */
+lam_status hierarchical_load(store *s, size_t n, size_t n_channels, const float *reflectance,
+                             lam_operator **op, lam_error *error);
+lam_status hierarchical_prepare(const lam_operator *op, lam_error *error);
+void hierarchical_rest_free(hierarchical_rest *rest);
+
+/* An operator without K and basis, of which each channel has its own K so far. Errors: as operator_init. */
+lam_status hierarchical_begin(size_t n, size_t n_channels, const float *reflectance, hierarchical **out,
+                              lam_error *error);
+
+/* The tiles of a K of an older store: GROUP/count [planes][n_groups] u16 (u32 where a row has more than
+ * 65,535 tiles), tile [tiles] u16, far u32, digit i8, as store/FORMAT.md says. Errors: as store_read;
+ * LAM_ERR_FORMAT where they do not fit together, LAM_ERR_NUMERIC for a tile that cannot be. */
 lam_status hierarchical_load_tiles(store *s, const char *group, size_t n_groups, const tile_group *groups,
                                    tile_matrix *out, lam_error *error);
-
-/* /operator/groups: rows [n_groups][2] u32 and step [n_groups] f32, the rows ascending and below n. Errors:
- * as store_read; LAM_ERR_NUMERIC. */
-lam_status hierarchical_save_groups(size_t n_groups, const tile_group *groups, const float *step, store *s,
-                                    lam_error *error);
-lam_status hierarchical_load_groups(store *s, size_t n, size_t *n_groups, tile_group **groups, float **step,
-                                    lam_error *error);
 
 #endif

@@ -19,9 +19,14 @@ static size_t coefficients_of(const hierarchical *self) {
     return self->plan.n_used + TILED_PAST;
 }
 
+/* Floats of those that K is multiplied with. */
+static size_t scaled_of(const hierarchical *self) {
+    return self->plan.n_used + (self->K[0].values.map != NULL ? TILED_BEYOND : TILED_PAST);
+}
+
 static size_t one_work_bytes(const hierarchical *self) {
     const wavelet_plan *plan = &self->plan;
-    const size_t parts[] = {self->base.n * sizeof(float), coefficients_of(self) * sizeof(float),
+    const size_t parts[] = {self->base.n * sizeof(float), scaled_of(self) * sizeof(float),
                             coefficients_of(self) * sizeof(float), wavelet_plan_work(plan) * sizeof(float),
                             plan->n_pieces * sizeof(double)};
     size_t total = WORK_AREA_ALIGN;
@@ -155,7 +160,7 @@ static areas take_areas(const hierarchical *self, void **work) {
     const wavelet_plan *plan = &self->plan;
     areas a = {.h = {.self = self}};
     a.h.X = work_area_take(work, self->base.n * sizeof *a.h.X);
-    a.from = work_area_take(work, coefficients_of(self) * sizeof *a.from);
+    a.from = work_area_take(work, scaled_of(self) * sizeof *a.from);
     a.to = work_area_take(work, coefficients_of(self) * sizeof *a.to);
     a.slots = work_area_take(work, wavelet_plan_work(plan) * sizeof *a.slots);
     a.h.sums = work_area_take(work, plan->n_pieces * sizeof *a.h.sums);

@@ -52,15 +52,18 @@ static void clear_marks(hierarchical_some *some) {
 /* Fills a part from the marks. The scaling coefficients of the root follow after those of all steps. */
 static void find_part(hierarchical_some *some, hierarchical_part *part) {
     const wavelet_plan *plan = &some->self->plan;
-    const uint32_t *group_of = some->self->K[0].group_of;
+    const uint32_t *group_ends = some->self->K[0].first + 1; /* coefficients ascend, and so do their groups */
     size_t count = 0;
+    uint32_t group = 0;
     part->n_steps = wavelet_plan_paths(plan, some->marks, some->flags, part->steps);
     for (size_t k = 0; k < part->n_steps; k++) {
         const plan_step *a = &plan->steps[part->steps[k]];
         const bool root = k + 1 == part->n_steps;
         const uint32_t first = a->first, last = first + a->own + (root ? a->scaling : 0);
-        for (uint32_t i = first; i < last; i++)
-            if (count == 0 || part->groups[count - 1] != group_of[i]) part->groups[count++] = group_of[i];
+        for (uint32_t i = first; i < last; i++) {
+            while (group_ends[group] <= i) group++;
+            if (count == 0 || part->groups[count - 1] != group) part->groups[count++] = group;
+        }
     }
     part->n_groups = count;
 }

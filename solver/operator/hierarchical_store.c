@@ -1,4 +1,4 @@
-/* The arrays of K in a store: tiles of signed bytes (tiles.h). */
+/* The tiles of K in older stores, of which one triangle is kept, without zeros (tiles.h). */
 #include "solver/operator/hierarchical.h"
 #include "store/groups.h"
 
@@ -13,80 +13,11 @@ enum { MASK_BITS = TILE * TILE, GAP_FAR = UINT16_MAX >> MASK_BITS };
 
 /* The steps of the upper triangle's tiles from one to the next, and their digits. */
 typedef struct tile_codes {
-    void *counts; /* [TILE_PLANES][n_groups] u16 or u32 */
-    uint16_t *tiles;
-    uint32_t *far;
-    int8_t *digits;
+    const uint16_t *tiles;
+    const uint32_t *far;
+    const int8_t *digits;
     size_t n_tiles, n_far, n_digits;
 } tile_codes;
-
-static void codes_free(tile_codes *codes) {
-    free(codes->counts);
-    free(codes->tiles);
-    free(codes->far);
-    free(codes->digits);
-}
-
-/* counts [n_planes][n_groups], of tiles. */
-static void encode_tiles(const tile_matrix *m, size_t n_planes, size_t n_groups, uint32_t *counts,
-                         tile_codes *out) {
-    for (size_t d = 0; d < n_planes; d++)
-        for (size_t k = 0; k < m->count[d]; k++) {
-            const tile_digits *t = &m->tiles[d][k];
-            const bool follows = k > 0 && t[-1].row == t->row;
-            const uint32_t gap = t->column - (follows ? t[-1].column : t->row);
-            unsigned mask = 0;
-            for (unsigned bit = 0; bit < MASK_BITS; bit++) {
-                const size_t r = bit / TILE, c = bit % TILE;
-                if (t->values[r][c] == 0 || (t->column == t->row && c < r)) continue;
-                mask |= 1u << bit;
-                out->digits[out->n_digits++] = t->values[r][c];
-            }
-            if (gap >= GAP_FAR) out->far[out->n_far++] = gap;
-            out->tiles[out->n_tiles++] = (uint16_t)((gap < GAP_FAR ? gap : GAP_FAR) << MASK_BITS | mask);
-            counts[d * n_groups + t->row]++;
-        }
-}
-
-lam_status hierarchical_save_tiles(const tile_matrix *m, size_t n_groups, const char *group, store *s,
-                                   lam_error *error) {
-    lam_status status = LAM_OK;
-    char name[64];
-    size_t n_planes = 1, all = 0;
-    tile_codes codes = {.n_tiles = 0};
-    uint32_t *counts = NULL, most = 0;
-    for (size_t d = 0; d < TILE_PLANES; d++) {
-        all += m->count[d];
-        if (m->count[d] > 0) n_planes = d + 1;
-    }
-    const size_t n_counts = n_planes * n_groups;
-    counts = memory_allocate(n_counts, sizeof *counts, "operator", error);
-    uint16_t *narrow = codes.counts = memory_allocate(n_counts, sizeof *narrow, "operator", error);
-    codes.tiles = memory_allocate(all, sizeof *codes.tiles, "operator", error);
-    codes.far = memory_allocate(all, sizeof *codes.far, "operator", error);
-    codes.digits = memory_allocate(all, MASK_BITS * sizeof *codes.digits, "operator", error);
-    if (counts == NULL || narrow == NULL || codes.tiles == NULL || codes.far == NULL || codes.digits == NULL)
-        TRY(LAM_ERR_MEMORY);
-    encode_tiles(m, n_planes, n_groups, counts, &codes);
-    for (size_t k = 0; k < n_counts; k++) {
-        narrow[k] = (uint16_t)counts[k];
-        most = counts[k] > most ? counts[k] : most;
-    }
-    const bool wide = most > UINT16_MAX;
-    snprintf(name, sizeof name, "%s/count", group);
-    TRY(store_write(s, name, wide ? STORE_U32 : STORE_U16, 2, (const size_t[]){n_planes, n_groups},
-                    wide ? (const void *)counts : (const void *)narrow, error));
-    snprintf(name, sizeof name, "%s/tile", group);
-    TRY(store_write(s, name, STORE_U16, 1, &codes.n_tiles, codes.tiles, error));
-    snprintf(name, sizeof name, "%s/far", group);
-    TRY(store_write(s, name, STORE_U32, 1, &codes.n_far, codes.far, error));
-    snprintf(name, sizeof name, "%s/digit", group);
-    TRY(store_write(s, name, STORE_I8, 1, &codes.n_digits, codes.digits, error));
-done:
-    free(counts);
-    codes_free(&codes);
-    return status;
-}
 
 /* Widens counts [dims[0]][dims[1]] where they are stored narrow. */
 static lam_status read_counts(store *s, const char *name, size_t *dims, uint32_t **out, lam_error *error) {
@@ -208,48 +139,5 @@ done:
     free(far);
     free(digits);
     tile_matrix_free(&made);
-    return status;
-}
-
-lam_status hierarchical_save_groups(size_t n_groups, const tile_group *groups, const float *step, store *s,
-                                    lam_error *error) {
-    lam_status status = LAM_OK;
-    TRY(store_write(s, STORE_OPERATOR "/groups/rows", STORE_U32, 2, (const size_t[]){n_groups, 2}, groups,
-                    error));
-    TRY(store_write(s, STORE_OPERATOR "/groups/step", STORE_F32, 1, &n_groups, step, error));
-done:
-    return status;
-}
-
-/* The largest step: a number of it and of four digits, and sums of them, are finite. */
-static const float step_most = 0x1p40f;
-
-lam_status hierarchical_load_groups(store *s, size_t n, size_t *n_groups, tile_group **groups, float **step,
-                                    lam_error *error) {
-    lam_status status = LAM_OK;
-    void *rows = NULL, *steps = NULL;
-    size_t dims[STORE_MAX_RANK] = {SIZE_MAX, 2}, end = 0;
-    TRY(store_read(s, STORE_OPERATOR "/groups/rows", STORE_U32, 2, dims, &rows, error));
-    TRY(store_read(s, STORE_OPERATOR "/groups/step", STORE_F32, 1, dims, &steps, error));
-    const tile_group *const found = rows;
-    for (size_t g = 0; g < dims[0]; g++) {
-        const float by = ((float *)steps)[g];
-        if (found[g].first < end || found[g].size < 1 || found[g].size > TILE ||
-            (size_t)found[g].first + found[g].size > n)
-            FAIL(error, LAM_ERR_NUMERIC,
-                 "groups/rows[%zu] = %u, %u: must have 1 to %d rows of %zu behind those of the group before",
-                 g, (unsigned)found[g].first, (unsigned)found[g].size, TILE, n);
-        if (!(by > 0 && by <= step_most))
-            FAIL(error, LAM_ERR_NUMERIC, "groups/step[%zu] = %g, must be above 0 and at most %g", g,
-                 (double)by, (double)step_most);
-        end = (size_t)found[g].first + found[g].size;
-    }
-    *n_groups = dims[0];
-    *groups = rows;
-    *step = steps;
-    rows = steps = NULL;
-done:
-    free(rows);
-    free(steps);
     return status;
 }

@@ -9,10 +9,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-void mean_correction_free(mean_correction *e) {
+void mean_correction_rest(mean_correction *e) {
     free(e->missing);
     free(e->light);
     free(e->lift);
+    e->missing = NULL;
+    e->light = NULL;
+    e->lift = NULL;
+}
+
+void mean_correction_free(mean_correction *e) {
+    mean_correction_rest(e);
     *e = (mean_correction){.n = 0};
 }
 
@@ -52,6 +59,21 @@ done:
     return status;
 }
 
+lam_status mean_correction_of_halves(size_t n, size_t n_channels, const uint16_t *missing,
+                                     const double *light, mean_correction *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    mean_correction e = {.n = 0};
+    TRY(reserve(n, n_channels, &e, error));
+    for (size_t k = 0; k < n * n_channels; k++) e.missing[k] = float_of_half(missing[k]);
+    memcpy(e.light, light, n_channels * sizeof *light);
+    TRY(check(&e, error));
+    *out = e;
+    e = (mean_correction){.n = 0};
+done:
+    mean_correction_free(&e);
+    return status;
+}
+
 lam_status mean_correction_save(const mean_correction *e, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     uint16_t *halves = NULL;
@@ -65,30 +87,6 @@ lam_status mean_correction_save(const mean_correction *e, store *s, lam_error *e
     TRY(store_write(s, STORE_OPERATOR "/even_light", STORE_F64, 1, &e->n_channels, e->light, error));
 done:
     free(halves);
-    return status;
-}
-
-lam_status mean_correction_load(store *s, size_t n, size_t n_channels, mean_correction *out,
-                                lam_error *error) {
-    lam_status status = LAM_OK;
-    mean_correction e = {.n = 0};
-    void *halves = NULL, *light = NULL;
-    if (!store_has(s, STORE_OPERATOR "/missing")) {
-        *out = e;
-        return LAM_OK;
-    }
-    TRY(reserve(n, n_channels, &e, error));
-    TRY(store_read(s, STORE_OPERATOR "/missing", STORE_F16, 2, (size_t[]){n_channels, n}, &halves, error));
-    TRY(store_read(s, STORE_OPERATOR "/even_light", STORE_F64, 1, (size_t[]){n_channels}, &light, error));
-    for (size_t k = 0; k < n * n_channels; k++) e.missing[k] = float_of_half(((const uint16_t *)halves)[k]);
-    memcpy(e.light, light, n_channels * sizeof *e.light);
-    TRY(check(&e, error));
-    *out = e;
-    e = (mean_correction){.n = 0};
-done:
-    free(halves);
-    free(light);
-    mean_correction_free(&e);
     return status;
 }
 
@@ -115,5 +113,5 @@ lam_status mean_correction_lift(mean_correction *e, const float *by, lam_error *
 }
 
 size_t mean_correction_bytes(const mean_correction *e) {
-    return e->missing != NULL ? e->n * e->n_channels * sizeof *e->lift : 0;
+    return e->n * e->n_channels * sizeof *e->lift;
 }

@@ -13,7 +13,7 @@
  * by missing. */
 typedef struct mean_correction {
     size_t n, n_channels;
-    float *missing; /* [C][n], by position, rounded to half precision; NULL: nothing is missing */
+    float *missing; /* [C][n], by position, rounded to half precision; NULL: nothing is missing, n is 0 */
     double *light;  /* [C], m^2 */
     float *lift;    /* [C][n], made by mean_correction_lift */
 } mean_correction;
@@ -25,11 +25,12 @@ void mean_correction_free(mean_correction *e);
 lam_status mean_correction_create(size_t n, size_t n_channels, const double *missing, const double *light,
                                   mean_correction *out, lam_error *error);
 
-/* /operator/missing [C][n] f16 and /operator/even_light [C] f64, both or none. Errors: as store_read,
- * LAM_ERR_NUMERIC as above. */
+/* The same from the arrays of a store, whose numbers have half precision. */
+lam_status mean_correction_of_halves(size_t n, size_t n_channels, const uint16_t *missing,
+                                     const double *light, mean_correction *out, lam_error *error);
+
+/* /operator/missing [C][n] f16 and /operator/even_light [C] f64, both or none. Errors: as store_write. */
 lam_status mean_correction_save(const mean_correction *e, store *s, lam_error *error);
-lam_status mean_correction_load(store *s, size_t n, size_t n_channels, mean_correction *out,
-                                lam_error *error);
 
 /* lift = by missing, by [C][n] by position: before the first product. Errors: LAM_ERR_MEMORY. */
 lam_status mean_correction_lift(mean_correction *e, const float *by, lam_error *error);
@@ -43,7 +44,9 @@ double mean_correction_sum(const float *by, const float *x, size_t count);
 enum { MEAN_PARTS = 8 };
 double mean_correction_total(const double *parts);
 
-/* Bytes that a product reads. */
+/* Bytes that a product reads, also after mean_correction_rest has freed the arrays: they are to be made anew.
+ */
+void mean_correction_rest(mean_correction *e);
 size_t mean_correction_bytes(const mean_correction *e);
 
 #endif

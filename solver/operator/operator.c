@@ -16,9 +16,13 @@ const operator_kind *operator_kind_find(const char *name) {
     return NULL;
 }
 
-uint64_t operator_unpacked_bytes(const char *kind, uint64_t stored) {
+uint64_t operator_memory(store *s, const char *kind, uint64_t stored) {
     const operator_kind *found = operator_kind_find(kind);
-    return found != NULL && found->unpacked > 0 ? found->unpacked * stored : stored;
+    return found != NULL && found->memory != NULL ? found->memory(s, stored) : stored;
+}
+
+lam_status operator_prepare(const lam_operator *op, lam_error *error) {
+    return op->kind->prepare != NULL ? op->kind->prepare(op, error) : LAM_OK;
 }
 
 static lam_status check_reflectance(size_t n, size_t n_channels, const float *reflectance, lam_error *error) {
@@ -39,13 +43,12 @@ lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, 
         FAIL(error, LAM_ERR_ARGUMENT, "an operator of %zu elements and %zu channels cannot be", n,
              n_channels);
     TRY(check_reflectance(n, n_channels, reflectance, error));
-    op->reflectance = memory_allocate(count, sizeof *op->reflectance, "reflectance", error);
-    if (op->reflectance == NULL) {
-        status = LAM_ERR_MEMORY;
-        goto done;
-    }
+    float *copy = memory_allocate(count, sizeof *copy, "reflectance", error);
+    if (copy == NULL) TRY(LAM_ERR_MEMORY);
     /* Division by a subnormal reflectance passes the range of single precision. */
-    for (size_t i = 0; i < count; i++) op->reflectance[i] = reflectance[i] < FLT_MIN ? 0.0f : reflectance[i];
+    for (size_t i = 0; i < count; i++) copy[i] = reflectance[i] < FLT_MIN ? 0.0f : reflectance[i];
+    op->reflectances = (store_view){.data = copy, .memory = copy};
+    op->reflectance = copy;
     op->kind = kind;
     op->n = n;
     op->n_channels = n_channels;
@@ -69,16 +72,16 @@ lam_status operator_set_order(lam_operator *op, const uint32_t *order, lam_error
         position = memory_allocate(op->n, sizeof *position, "order", error);
         if (copy == NULL || position == NULL) TRY(LAM_ERR_MEMORY);
         memset(position, 0xff, op->n * sizeof *position);
+        memcpy(copy, order, op->n * sizeof *copy); /* order may be mapped, and change */
         for (size_t p = 0; p < op->n; p++) {
-            if (order[p] >= op->n)
-                FAIL(error, LAM_ERR_NUMERIC, "order[%zu] = %u, must be below %zu", p, (unsigned)order[p],
+            if (copy[p] >= op->n)
+                FAIL(error, LAM_ERR_NUMERIC, "order[%zu] = %u, must be below %zu", p, (unsigned)copy[p],
                      op->n);
-            if (position[order[p]] != UINT32_MAX)
+            if (position[copy[p]] != UINT32_MAX)
                 FAIL(error, LAM_ERR_NUMERIC, "order[%zu] = %u, which stands there twice", p,
-                     (unsigned)order[p]);
-            position[order[p]] = (uint32_t)p;
+                     (unsigned)copy[p]);
+            position[copy[p]] = (uint32_t)p;
         }
-        memcpy(copy, order, op->n * sizeof *copy);
     }
     free(op->order);
     free(op->position);
@@ -111,24 +114,36 @@ done:
     return status;
 }
 
+/* Mapped reflectances that an operator takes as they are need no copy. */
+static void share_reflectances(lam_operator *op, store_view *reflectances) {
+    const size_t bytes = op->n_channels * op->n * sizeof *op->reflectance;
+    if (reflectances->map == NULL || memcmp(reflectances->data, op->reflectance, bytes) != 0) return;
+    store_view_free(&op->reflectances);
+    op->reflectances = *reflectances;
+    op->reflectance = reflectances->data;
+    *reflectances = (store_view){.data = NULL};
+}
+
 lam_status operator_load(store *s, lam_operator **out, lam_error *error) {
     lam_status status = LAM_OK;
     const operator_kind *kind = NULL;
     lam_operator *op = NULL;
-    void *reflectance = NULL, *order = NULL;
+    store_view reflectances = {.data = NULL};
+    void *order = NULL;
     size_t dims[STORE_MAX_RANK] = {SIZE_MAX, SIZE_MAX};
     lam_error cause = {.message = ""};
     if (!store_has(s, STORE_OPERATOR))
         FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", store_path(s));
     TRY(load_kind(s, &kind, error));
-    TRY(store_read(s, STORE_MESH "/reflectance", STORE_F32, 2, dims, &reflectance, error));
+    TRY(store_read_view(s, STORE_MESH "/reflectance", STORE_F32, 2, dims, &reflectances, error));
     size_t n_channels = dims[0], n = dims[1];
     if (n == 0 || n_channels == 0 || n > UINT32_MAX)
         FAIL(error, LAM_ERR_FORMAT,
              "%s: /mesh/reflectance is %zu x %zu, must be channels x elements, not empty", store_path(s),
              n_channels, n);
-    status = kind->load(s, n, n_channels, reflectance, &op, &cause);
-    if (status == LAM_OK && store_has(s, STORE_OPERATOR "/order")) {
+    status = kind->load(s, n, n_channels, reflectances.data, &op, &cause);
+    if (status == LAM_OK) share_reflectances(op, &reflectances);
+    if (status == LAM_OK && kind->prepare == NULL && store_has(s, STORE_OPERATOR "/order")) {
         dims[0] = n;
         status = store_read(s, STORE_OPERATOR "/order", STORE_U32, 1, dims, &order, &cause);
         if (status == LAM_OK) status = operator_set_order(op, order, &cause);
@@ -139,7 +154,7 @@ lam_status operator_load(store *s, lam_operator **out, lam_error *error) {
     *out = op;
     op = NULL;
 done:
-    free(reflectance);
+    store_view_free(&reflectances);
     free(order);
     lam_operator_close(op);
     return status;
@@ -148,6 +163,7 @@ done:
 lam_status operator_save(const lam_operator *op, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     operator_description description = {0};
+    TRY(operator_prepare(op, error));
     op->kind->describe(op, &description);
     TRY(store_set_text(s, STORE_OPERATOR, "kind", op->kind->name, error));
     if (description.form != NULL) TRY(store_set_text(s, STORE_OPERATOR, "form", description.form, error));
@@ -181,7 +197,7 @@ done:
 void lam_operator_close(lam_operator *op) {
     if (op == NULL) return;
     op->kind->destroy(op);
-    free(op->reflectance);
+    store_view_free(&op->reflectances);
     free(op->order);
     free(op->position);
     free(op);

@@ -32,6 +32,9 @@ typedef struct operator_description {
  * position order is never in memory; answer_selected, beside answer and in place of apply_selected, which
  * writes the same bits of n_selected elements to out [C][n_selected] of each vector, or returns false where
  * whole answers take no longer, and has written none;
+ * prepare, which makes all that apply, apply_adjoint, apply_selected and answer read beside what a store's
+ * mapping has, once, whatever thread comes first (LAM_ERR_MEMORY, LAM_ERR_DAMAGED); the order too is there
+ * from then on alone. work_bytes and describe go without it;
  * set_threads, which passes n_threads on to its arrays;
  * narrow, which makes the operator again with its large arrays in another precision, all of its own; relight,
  * which makes it again under other reflectances, its large arrays those of op; check, which compares the
@@ -59,6 +62,7 @@ typedef struct operator_kind {
     void (*answer)(const lam_operator *op, size_t n_rhs, const operator_vector *vectors, void *work);
     bool (*answer_selected)(const lam_operator *op, size_t n_rhs, const operator_vector *vectors,
                             size_t n_selected, const uint32_t *selected, void *work);
+    lam_status (*prepare)(const lam_operator *op, lam_error *error);
     void (*set_threads)(lam_operator *op, size_t n_threads);
     lam_status (*narrow)(const lam_operator *op, panel_precision precision, lam_operator **out,
                          lam_error *error);
@@ -67,18 +71,20 @@ typedef struct operator_kind {
     void (*destroy)(lam_operator *op);
     void (*describe)(const lam_operator *op, operator_description *description);
     bool (*check)(const lam_operator *op, const double *area, char *detail, size_t size);
-    unsigned unpacked; /* bytes of memory that a byte of its arrays in a store takes once loaded; 0: one */
-    bool whole;        /* all n^2 coefficients are stored: density 1 where the store states none */
+    /* Bytes of memory that so many bytes of its arrays in a store take once loaded; NULL: as many. */
+    uint64_t (*memory)(store *s, uint64_t stored);
+    bool whole; /* all n^2 coefficients are stored: density 1 where the store states none */
 } operator_kind;
 
 struct lam_operator {
     const operator_kind *kind;
     size_t n;
     size_t n_channels;
-    float *reflectance; /* [C][n], mesh order, owned */
-    uint32_t *order;    /* [n], position -> element, owned; NULL: mesh order */
-    uint32_t *position; /* [n], element -> position, owned; NULL with order */
-    size_t n_threads;   /* of one answer */
+    const float *reflectance; /* [C][n], mesh order */
+    store_view reflectances;  /* they hold it, mapped or in memory */
+    uint32_t *order;          /* [n], position -> element, owned; NULL: mesh order */
+    uint32_t *position;       /* [n], element -> position, owned; NULL with order */
+    size_t n_threads;         /* of one answer */
 };
 
 /* The list of kinds: adding one is a line here. */
@@ -96,9 +102,12 @@ OPERATOR_KINDS(OPERATOR_KIND_DECLARE)
 /* The kind of this name, or NULL. */
 const operator_kind *operator_kind_find(const char *name);
 
-/* Bytes of memory that an operator of this kind takes of so many bytes of /operator; an unknown kind, which
- * operator_load refuses, counts once. */
-uint64_t operator_unpacked_bytes(const char *kind, uint64_t stored);
+/* Bytes of memory that the operator of an open store takes, of this kind and so many bytes of /operator; an
+ * unknown kind, which operator_load refuses, counts once. */
+uint64_t operator_memory(store *s, const char *kind, uint64_t stored);
+
+/* Makes what the kind's products read, where that is not there yet (prepare). Any thread. */
+lam_status operator_prepare(const lam_operator *op, lam_error *error);
 
 /* Fills the shared part of a zeroed operator (copies reflectance, 0 in place of values below FLT_MIN);
  * kind->destroy frees what the kind added. Errors: LAM_ERR_NUMERIC names a reflectance outside [0, 1),

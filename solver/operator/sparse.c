@@ -223,6 +223,12 @@ static void sparse_describe(const lam_operator *op, operator_description *descri
     description->density = entries / whole;
 }
 
+/* By columns too. */
+static uint64_t sparse_memory(store *s, uint64_t stored) {
+    (void)s;
+    return 2 * stored;
+}
+
 const operator_kind operator_sparse = {
     .name = "sparse",
     .load = sparse_load,
@@ -233,5 +239,5 @@ const operator_kind operator_sparse = {
     .apply_selected = sparse_apply_selected,
     .destroy = sparse_destroy,
     .describe = sparse_describe,
-    .unpacked = 2, /* by columns too */
+    .memory = sparse_memory,
 };

@@ -1,4 +1,5 @@
-/* Hierarchical operators in a store: what the arrays of K mean, and what is refused in one clear line. */
+/* Hierarchical operators in a store: what the arrays of K mean, of older stores and of those that are written
+ * now, with the same bits, and what is refused in one clear line. */
 #include "support/operator_file.h"
 #include "support/suite.h"
 
@@ -80,7 +81,7 @@ static double K_of(size_t i, size_t j) {
 
 static void write_array(store *s, const recipe *r, const char *name, store_type type, int rank,
                         const size_t *dims, const void *data) {
-    double none[64] = {0};
+    double none[4 * sizeof(tile_four)] = {0};
     if (r->without != NULL && strcmp(r->without, name) == 0) return;
     if (r->other_type != NULL && strcmp(r->other_type, name) == 0)
         ck_ok(store_write(s, name, STORE_F64, rank, dims, none, &error));
@@ -118,7 +119,8 @@ static double area_of(size_t i) {
     return i % 2 == 0 ? 1 : 4;
 }
 
-static void write_recipe(const recipe *r) {
+/* All but the tiles; the store is not sealed. */
+static store *begin_file(void) {
     store *s = NULL;
     float rho[N], basis[4 * 4 * 2 + 6 * 6] = {0}, *to = basis;
     double area[N];
@@ -136,8 +138,85 @@ static void write_recipe(const recipe *r) {
     ck_ok(store_write(s, "/operator/basis/shape", STORE_U32, 2, (const size_t[]){3, 3}, shapes, &error));
     ck_ok(store_write(s, "/operator/basis/basis", STORE_F32, 1, &(size_t){4 * 4 * 2 + 6 * 6}, basis, &error));
     ck_ok(store_write(s, "/operator/basis/node", STORE_U32, 1, &(size_t){3}, nodes, &error));
+    return s;
+}
+
+static void write_recipe(const recipe *r) {
+    store *s = begin_file();
     write_tiles(s, r);
     ck_ok(store_seal(s, &error));
+}
+
+/* The file as it is written now: what differs from a good one, as above. */
+typedef struct recipe_of_now {
+    const char *what, *without, *other_type;
+    size_t n_begins, part; /* part > 0: begin[part] is begin */
+    uint32_t begin, base;  /* base > 0: of the second four */
+    uint16_t beyond;       /* of its second tile */
+    int64_t numbers;       /* 0: as there are */
+    const char *word;
+} recipe_of_now;
+
+static const recipe_of_now recipes_of_now[] = {
+    {.what = "good"},
+    {.what = "no begin", .without = "/operator/K/0/begin", .word = "has no /operator/K/0/begin"},
+    {.what = "no fours", .without = "/operator/K/0/four", .word = "/operator/K/0/four"},
+    {.what = "no numbers", .numbers = INT64_MIN, .word = "numbers"},
+    {.what = "fewer than no numbers", .numbers = -2, .word = "/operator/K/0 has -2 numbers"},
+    {.what = "fours in double", .other_type = "/operator/K/0/four", .word = "/operator/K/0/four"},
+    {.what = "a begin too few",
+     .n_begins = 2 * GROUPS,
+     .word = "begin has 6 numbers, must have one for each"},
+    {.what = "begins of five planes", .n_begins = 5 * GROUPS + 1, .word = "begin has 16 numbers"},
+    {.what = "begins that fall",
+     .part = 2,
+     .begin = 3,
+     .word = "begin[2] = 3, must not be above the next, 1"},
+    {.what = "begins of fewer",
+     .part = 6,
+     .begin = 3,
+     .word = "begin goes from 0 to 3, must go from 0 to the 4"},
+    {.what = "a four beyond", .base = N, .word = "four[1] has column 8, must be below 8"},
+    {.what = "a tile beyond", .beyond = 4, .word = "four[1] has column 9, must be below 8"},
+};
+
+/* The numbers of K_of: rows of fours of the groups 0, 1 and 2, of the planes 1 and 0. */
+static void write_fours(store *s, const recipe_of_now *r) {
+    uint32_t begin[5 * GROUPS + 1] = {0, 0, 1, 1, 2, 3, 4};
+    tile_four fours[4] = {
+        {.base = 0, .beyond = {0, 5}, .values = {{3, -2, 0, 7}, {-2, 5, 0, 0, 0, -128}}},
+        {.base = 5, .values = {{0}, {0}, {0, 0, -1}}},
+        {.base = 5, .values = {{1}}},
+        {.base = 0, .beyond = {0, 2, 5}, .values = {{7, 0, 0, 0, 0, 0, 100}, {0}, {0, -128, 0, 0, 0, -1}}}};
+    const size_t n_begins = r->n_begins > 0 ? r->n_begins : 2 * GROUPS + 1;
+    const recipe plain = {.without = r->without, .other_type = r->other_type};
+    if (r->part > 0) begin[r->part] = r->begin;
+    if (r->base > 0) fours[1].base = r->base;
+    if (r->beyond > 0) fours[1].beyond[1] = r->beyond;
+    write_array(s, &plain, "/operator/groups/rows", STORE_U32, 2, (const size_t[]){GROUPS, 2},
+                (const uint32_t[GROUPS][2]){{0, 2}, {2, 3}, {5, 3}});
+    write_array(s, &plain, "/operator/groups/step", STORE_F32, 1, &(size_t){GROUPS},
+                (const float[]){.5f, 1, 2});
+    write_array(s, &plain, "/operator/K/0/begin", STORE_U32, 1, &n_begins, begin);
+    write_array(s, &plain, "/operator/K/0/four", STORE_I8, 2, (const size_t[]){4, sizeof *fours}, fours);
+    if (r->numbers != INT64_MIN)
+        ck_ok(store_set_integer(s, "/operator/K/0", "numbers", r->numbers == 0 ? 11 : r->numbers, &error));
+}
+
+static void write_recipe_of_now(const recipe_of_now *r) {
+    store *s = begin_file();
+    write_fours(s, r);
+    ck_ok(store_seal(s, &error));
+}
+
+static lam_operator *open_file(bool mapped) {
+    store *s = NULL;
+    lam_operator *op = NULL;
+    ck_ok(store_open(operator_file_path, &s, &error));
+    if (mapped) ck_ok(store_map_file(s, &error));
+    ck_ok(operator_load(s, &op, &error));
+    store_close(s);
+    return op;
 }
 
 START_TEST(files_are_judged) {
@@ -147,14 +226,55 @@ START_TEST(files_are_judged) {
 }
 END_TEST
 
+START_TEST(files_of_now_are_judged) {
+    const recipe_of_now *r = &recipes_of_now[_i];
+    write_recipe_of_now(r);
+    operator_file_judge(r->what, r->word == NULL ? LAM_OK : LAM_ERR_FORMAT, r->word);
+}
+END_TEST
+
+/* The arrays that are written for an operator of an older store are those of write_fours. */
+START_TEST(older_files_become_those_of_now) {
+    static const char *const arrays[] = {"/operator/K/0/begin", "/operator/K/0/four"};
+    store *s = NULL;
+    void *bytes[2][2];
+    write_recipe(&recipes[0]);
+    lam_operator *op = open_file(false);
+    for (int k = 0; k < 2; k++) {
+        size_t begins[] = {SIZE_MAX}, fours[] = {4, sizeof(tile_four)};
+        int64_t numbers;
+        if (k == 0) {
+            ck_ok(store_create(operator_file_path, &s, &error));
+            ck_ok(operator_save(op, s, &error));
+            ck_ok(store_seal(s, &error));
+        } else {
+            write_recipe_of_now(&recipes_of_now[0]);
+        }
+        ck_ok(store_open(operator_file_path, &s, &error));
+        ck_ok(store_read(s, arrays[0], STORE_U32, 1, begins, &bytes[k][0], &error));
+        ck_ok(store_read(s, arrays[1], STORE_I8, 2, fours, &bytes[k][1], &error));
+        ck_ok(store_get_integer(s, "/operator/K/0", "numbers", &numbers, &error));
+        ck_assert_uint_eq(begins[0], 2 * GROUPS + 1);
+        ck_assert_int_eq(numbers, 11);
+        store_close(s);
+    }
+    ck_assert_mem_eq(bytes[0][0], bytes[1][0], (2 * GROUPS + 1) * sizeof(uint32_t));
+    ck_assert_mem_eq(bytes[0][1], bytes[1][1], 4 * sizeof(tile_four));
+    for (int k = 0; k < 4; k++) free(bytes[k / 2][k % 2]);
+    lam_operator_close(op);
+}
+END_TEST
+
 /* H = A^-1/2 W^T K W A^1/2 E for one element that shines, whose light is made by columns, and for all. */
 START_TEST(arrays_mean_what_the_format_says) {
-    for (size_t k = 0; recipes[k].word == NULL; k++)
+    for (size_t k = 0; k < 4; k++)
         for (size_t from = 0; from <= N; from++) {
-            lam_operator *op = NULL;
             float E[N] = {0};
-            write_recipe(&recipes[k]);
-            ck_ok(lam_operator_open(operator_file_path, &op, &error));
+            if (k < 2)
+                write_recipe(&recipes[k]);
+            else
+                write_recipe_of_now(&recipes_of_now[0]);
+            lam_operator *op = open_file(k == 3);
             for (size_t i = 0; i < N; i++) E[i] = from == N ? (float)(i + 1) : i == from;
             float *H = transport_apply(op, false, 1, LAM_IRRADIANCE, E);
             for (size_t i = 0; i < N; i++) {
@@ -166,7 +286,7 @@ START_TEST(arrays_mean_what_the_format_says) {
                 }
                 const double root = sqrt(area_of(element_of[i]));
                 ck_assert_msg(fabs((double)H[element_of[i]] - sum / root) <= 2 * size / root,
-                              "%s: H[%u] = %g, %g", recipes[k].what, element_of[i], (double)H[element_of[i]],
+                              "file %zu: H[%u] = %g, %g", k, element_of[i], (double)H[element_of[i]],
                               sum / root);
             }
             free(H);
@@ -181,6 +301,9 @@ int main(void) {
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, operator_file_setup, operator_file_teardown);
     tcase_add_loop_test(tests, files_are_judged, 0, (int)(sizeof recipes / sizeof *recipes));
+    tcase_add_loop_test(tests, files_of_now_are_judged, 0,
+                        (int)(sizeof recipes_of_now / sizeof *recipes_of_now));
+    tcase_add_test(tests, older_files_become_those_of_now);
     tcase_add_test(tests, arrays_mean_what_the_format_says);
     suite_add_tcase(suite, tests);
     return suite_run(suite);

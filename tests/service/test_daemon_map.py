@@ -113,7 +113,7 @@ class Mapped(unittest.TestCase):
             self.assertEqual(self.gauge(daemon, "scenes_unverified"), 0)
             self.assertEqual(self.gauge(daemon, "scenes_damaged"), 0)
             self.assertEqual(self.gauge(daemon, "scenes"), 3)
-            self.assertEqual(self.gauge(daemon, "mapped_bytes"), 5 * BYTES)  # Y, V; U, V, first_bounce
+            self.assertEqual(self.gauge(daemon, "mapped_bytes"), 5 * BYTES + 120000)  # Y, V; U, V, core, first_bounce
             self.assertNotIn("verified small", daemon.output())
             self.assertEqual(daemon.errors(), "")
 

@@ -18,13 +18,21 @@ enum { PIECE_ELEMENTS = 4096, WHOLE_ELEMENTS = 96 };
 /* Numbers that are compared with 0 at once. */
 enum { LOOKED_AT = 64 };
 
-void wavelet_plan_free(wavelet_plan *plan) {
+void wavelet_plan_rest(wavelet_plan *plan) {
     free(plan->steps);
     free(plan->matrices);
     free(plan->coefficient);
     free(plan->leaves);
     free(plan->pieces);
     free(plan->above);
+    plan->steps = NULL;
+    plan->matrices = NULL;
+    plan->coefficient = plan->leaves = plan->above = NULL;
+    plan->pieces = NULL;
+}
+
+void wavelet_plan_free(wavelet_plan *plan) {
+    wavelet_plan_rest(plan);
     *plan = (wavelet_plan){.n = 0};
 }
 

@@ -34,6 +34,9 @@ typedef struct wavelet_plan {
 
 void wavelet_plan_free(wavelet_plan *plan);
 
+/* Frees the arrays; the numbers of steps, pieces and so on stay. */
+void wavelet_plan_rest(wavelet_plan *plan);
+
 /* used: [n] by coefficient of the basis, which must outlive the plan. Errors: LAM_ERR_MEMORY. */
 lam_status wavelet_plan_create(const wavelets *basis, const bool *used, wavelet_plan *out, lam_error *error);
 

@@ -194,22 +194,50 @@ done:
     return status;
 }
 
-lam_status wavelets_load(store *s, const char *group, size_t n, wavelets *out, lam_error *error) {
+void wavelet_arrays_free(wavelet_arrays *arrays) {
+    store_view_free(&arrays->shape);
+    store_view_free(&arrays->basis);
+    store_view_free(&arrays->node);
+}
+
+lam_status wavelets_read(store *s, const char *group, wavelet_arrays *out, lam_error *error) {
     lam_status status = LAM_OK;
     char name[64];
-    void *shapes = NULL, *basis = NULL, *nodes = NULL;
-    size_t n_shapes[STORE_MAX_RANK] = {SIZE_MAX, 3}, count[STORE_MAX_RANK] = {SIZE_MAX},
-           n_nodes[STORE_MAX_RANK] = {SIZE_MAX};
+    wavelet_arrays read = {.n_shapes = 0};
+    size_t shapes[STORE_MAX_RANK] = {SIZE_MAX, 3}, count[STORE_MAX_RANK] = {SIZE_MAX},
+           nodes[STORE_MAX_RANK] = {SIZE_MAX};
     snprintf(name, sizeof name, "%s/shape", group);
-    TRY(store_read(s, name, STORE_U32, 2, n_shapes, &shapes, error));
+    TRY(store_read_view(s, name, STORE_U32, 2, shapes, &read.shape, error));
     snprintf(name, sizeof name, "%s/basis", group);
-    TRY(store_read(s, name, STORE_F32, 1, count, &basis, error));
+    TRY(store_read_view(s, name, STORE_F32, 1, count, &read.basis, error));
     snprintf(name, sizeof name, "%s/node", group);
-    TRY(store_read(s, name, STORE_U32, 1, n_nodes, &nodes, error));
+    TRY(store_read_view(s, name, STORE_U32, 1, nodes, &read.node, error));
+    read.n_shapes = shapes[0];
+    read.basis_count = count[0];
+    read.n_nodes = nodes[0];
+    *out = read;
+    read = (wavelet_arrays){.n_shapes = 0};
+done:
+    wavelet_arrays_free(&read);
+    return status;
+}
+
+/* Numbers are checked after they are copied, as a mapped file may change. */
+lam_status wavelets_make(const wavelet_arrays *from, size_t n, wavelets *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    wavelet_shape *shapes = memory_allocate(from->n_shapes, sizeof *shapes, "wavelets", error);
+    float *basis = memory_allocate(from->basis_count, sizeof *basis, "wavelets", error);
+    uint32_t *nodes = memory_allocate(from->n_nodes, sizeof *nodes, "wavelets", error);
+    if (shapes == NULL || basis == NULL || nodes == NULL) TRY(LAM_ERR_MEMORY);
+    if (from->n_shapes > 0) memcpy(shapes, from->shape.data, from->n_shapes * sizeof *shapes);
+    if (from->basis_count > 0) memcpy(basis, from->basis.data, from->basis_count * sizeof *basis);
+    if (from->n_nodes > 0) memcpy(nodes, from->node.data, from->n_nodes * sizeof *nodes);
     wavelet_shape *const taken_shapes = shapes;
     float *const taken_basis = basis;
-    shapes = basis = NULL;
-    TRY(wavelets_create(n, n_nodes[0], nodes, n_shapes[0], taken_shapes, taken_basis, count[0], out, error));
+    shapes = NULL;
+    basis = NULL;
+    TRY(wavelets_create(n, from->n_nodes, nodes, from->n_shapes, taken_shapes, taken_basis,
+                        from->basis_count, out, error));
 done:
     free(shapes);
     free(basis);

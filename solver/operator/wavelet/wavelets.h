@@ -9,7 +9,7 @@
 #ifndef LAMBERT_OPERATOR_WAVELET_WAVELETS_H
 #define LAMBERT_OPERATOR_WAVELET_WAVELETS_H
 
-#include "store/store.h"
+#include "store/store_map.h"
 
 #include <stdint.h>
 
@@ -79,9 +79,17 @@ static inline size_t wavelets_work(const wavelets *w) {
  * at most eight products for each node above its element. */
 void wavelets_forward(const wavelets *w, const double *x, double *c, double *work);
 
-/* GROUP/shape [n_shapes][3] u32, basis [basis_count] f32, node [n_nodes] u32. Errors: as store_read;
- * LAM_ERR_NUMERIC as wavelets_create. */
+/* GROUP/shape [n_shapes][3] u32, basis [basis_count] f32, node [n_nodes] u32. Errors: as store_write. */
 lam_status wavelets_save(const wavelets *w, const char *group, store *s, lam_error *error);
-lam_status wavelets_load(store *s, const char *group, size_t n, wavelets *out, lam_error *error);
+
+/* These arrays of a store, which may be mapped. Errors of wavelets_read: as store_read_view. wavelets_make
+ * copies them. Errors: as wavelets_create. */
+typedef struct wavelet_arrays {
+    store_view shape, basis, node;
+    size_t n_shapes, basis_count, n_nodes;
+} wavelet_arrays;
+lam_status wavelets_read(store *s, const char *group, wavelet_arrays *out, lam_error *error);
+lam_status wavelets_make(const wavelet_arrays *from, size_t n, wavelets *out, lam_error *error);
+void wavelet_arrays_free(wavelet_arrays *arrays);
 
 #endif

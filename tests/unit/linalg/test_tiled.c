@@ -1,8 +1,9 @@
 /* Symmetric matrices in tiles: rounded to the steps of rows and columns, and products with them, against
- * double, and the same bits in any batch. */
+ * double, and the same bits in any batch and from a store. */
 #include "solver/base/random.h"
 #include "solver/linalg/tiled.h"
 #include "support/dense.h"
+#include "support/store_sample.h"
 #include "support/suite.h"
 
 #include <float.h>
@@ -105,16 +106,39 @@ static size_t count_numbers(size_t n, const double *K) {
     return count;
 }
 
-static void check_same(const tile_matrix *a, const tile_matrix *b) {
-    for (size_t d = 0; d < TILE_PLANES; d++) {
-        ck_assert_uint_eq(a->count[d], b->count[d]);
-        for (size_t k = 0; k < a->count[d]; k++) {
-            const tile_digits *t = &a->tiles[d][k], *u = &b->tiles[d][k];
-            ck_assert_uint_eq(t->row, u->row);
-            ck_assert_uint_eq(t->column, u->column);
-            ck_assert_mem_eq(t->values, u->values, sizeof t->values);
-        }
+/* The bits of a matrix that was saved and read again, in place and not, and of its products. */
+static void check_store(const tiled_rows *t, const tile_group *groups, const float *step, const float *scaled,
+                        const float *product) {
+    char folder[64], path[128];
+    store *s = NULL;
+    float *y = test_allocate(t->n + TILED_PAST, sizeof *y),
+          *x = test_allocate(t->n + TILED_BEYOND, sizeof *x);
+    sample_folder(folder);
+    snprintf(path, sizeof path, "%s/tiles.h5", folder);
+    memcpy(x, scaled, (t->n + TILED_PAST) * sizeof *x);
+    ck_ok(store_create(path, &s, &error));
+    ck_ok(tiled_save(t, "/K", s, &error));
+    ck_ok(store_seal(s, &error));
+    for (int mapped = 0; mapped < 2; mapped++) {
+        tiled_rows back;
+        ck_ok(store_open(path, &s, &error));
+        if (mapped) ck_ok(store_map_file(s, &error));
+        ck_ok(tiled_load(s, "/K", t->n, t->n_groups, &back, &error));
+        store_close(s);
+        ck_assert_int_eq(back.values.map != NULL, mapped && t->n_fours * sizeof *t->fours >= STORE_MAP_LEAST);
+        ck_ok(tiled_set_rows(&back, groups, step, &error));
+        ck_assert_uint_eq(back.n_numbers, t->n_numbers);
+        ck_assert_uint_eq(back.n_planes, t->n_planes);
+        ck_assert_uint_eq(tiled_bytes(&back), tiled_bytes(t));
+        ck_assert_mem_eq(back.fours, t->fours, t->n_fours * sizeof *t->fours);
+        ck_assert_mem_eq(back.begin, t->begin, (t->n_groups * t->n_planes + 1) * sizeof *t->begin);
+        tiled_multiply(&back, x, y, 1);
+        ck_assert_mem_eq(y, product, t->n * sizeof *y);
+        tiled_free(&back);
     }
+    sample_folder_remove(folder);
+    free(x);
+    free(y);
 }
 
 /* out [m][N + TILED_PAST] = the columns of X [m][N] times their steps. */
@@ -179,7 +203,7 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     const int digits = 1 + _i;
     uint64_t state = 3;
     tiled_rows t;
-    tile_matrix m, back;
+    tile_matrix m;
     tile_group groups[N];
     float step[N], row_step[N];
     uint32_t asked[ASKED];
@@ -197,8 +221,7 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     ck_assert_uint_eq(tile_matrix_numbers(&m), count_numbers(N, K));
     ck_ok(tiled_create(&m, n_groups, groups, step, &t, &error));
     ck_assert_uint_eq(t.n_planes, (size_t)digits);
-    ck_ok(tiled_upper(&t, &back, &error));
-    check_same(&m, &back);
+    ck_assert_uint_eq(t.n_numbers, count_numbers(N, K));
     for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)(random_lcg_unit(&state) - .4);
     scale(VECTORS, X, t.step, scaled);
     for (size_t count = 1; count <= VECTORS; count += 5)
@@ -206,6 +229,7 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
             check_lanes(&t, count, scaled, lanes, n_threads);
     for (size_t v = 0; v < VECTORS; v++) tiled_multiply(&t, scaled + v * room, Y + v * N, 1);
     check_against_double(N, K, X, Y);
+    check_store(&t, groups, step, scaled, Y);
     for (size_t k = 0; k < ASKED; k++) asked[k] = (uint32_t)(k * n_groups / ASKED);
     tiled_multiply(&t, scaled, one, 1);
     for (size_t i = 0; i < N; i++) Y[i] = NAN;
@@ -226,7 +250,6 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     check_lanes(&t, VECTORS - 1, scaled + room, lanes, 1);
     tiled_free(&t);
     tile_matrix_free(&m);
-    tile_matrix_free(&back);
     csr_free(&a);
     free(K);
     free(X);
@@ -246,7 +269,7 @@ START_TEST(tiles_may_be_far_from_each_other) {
     tile_group *groups = test_allocate(FAR, sizeof *groups);
     float *step = test_allocate(FAR, sizeof *step), *scaled = test_allocate(FAR + TILED_PAST, sizeof *scaled);
     tiled_rows t;
-    tile_matrix m, back;
+    tile_matrix m;
     const csr a = {.n = FAR + 2, .indptr = indptr, .indices = indices, .data = data};
     for (size_t i = 1; i <= FAR + 2; i++) indptr[i] = 4;
     /* Rows 1 and 2 are in no group. */
@@ -259,8 +282,6 @@ START_TEST(tiles_may_be_far_from_each_other) {
     ck_ok(tiled_create(&m, FAR, groups, step, &t, &error));
     ck_assert_uint_eq(t.n, FAR);
     ck_assert_uint_eq(t.begin[1], 2);
-    ck_ok(tiled_upper(&t, &back, &error));
-    check_same(&m, &back);
     for (size_t g = 0; g < FAR; g++) scaled[g] = t.step[g] * X[g];
     tiled_multiply(&t, scaled, Y, 1);
     ck_assert_float_eq(Y[0], 3 * X[0] - 5 * X[2] + 7 * X[FAR - 3] + 11 * X[FAR - 1]);
@@ -268,7 +289,6 @@ START_TEST(tiles_may_be_far_from_each_other) {
     ck_assert_float_eq(Y[FAR - 1], 11 * X[0]);
     tiled_free(&t);
     tile_matrix_free(&m);
-    tile_matrix_free(&back);
     free(indptr);
     free(places);
     free(X);
@@ -276,6 +296,45 @@ START_TEST(tiles_may_be_far_from_each_other) {
     free(groups);
     free(step);
     free(scaled);
+}
+END_TEST
+
+/* Tiles that are changed while they are mapped, as another program may, lead to no memory but that of the
+ * vectors: y is between numbers that stay. */
+START_TEST(changed_tiles_stay_within_vectors) {
+    enum { LANES = TILED_WIDE, GUARD = 64 };
+    const float kept = 7;
+    uint64_t state = 5;
+    tile_group groups[N];
+    float step[N], row_step[N];
+    tile_matrix m;
+    tiled_rows t;
+    const size_t n_groups = random_groups(N, groups, step, row_step, &state), room = N + TILED_PAST;
+    csr a = random_rows(N, row_step, 2, &state);
+    ck_ok(tile_matrix_round(&a, n_groups, groups, step, &m, &error));
+    ck_ok(tiled_create(&m, n_groups, groups, step, &t, &error));
+    tile_four *fours = t.values.memory;
+    uint32_t *begin = t.begins.memory;
+    for (size_t f = 0; f < t.n_fours; f++) {
+        fours[f].base = f % 3 == 0 ? UINT32_MAX : N - 1;
+        for (size_t k = 0; k < TILES_AT_ONCE; k++) fours[f].beyond[k] = (uint16_t)(UINT16_MAX * (f % 2));
+    }
+    for (size_t k = 0; k < n_groups; k += 7) begin[k] = UINT32_MAX;
+    float *x = test_allocate(N + TILED_BEYOND, sizeof *x), *y = test_allocate(room + GUARD, sizeof *y),
+          *lanes = aligned_alloc(64, 3 * room * LANES * sizeof *lanes);
+    for (size_t i = 0; i < room + GUARD; i++) y[i] = kept;
+    for (size_t i = 0; i < 3 * room * LANES; i++) lanes[i] = 1;
+    for (size_t i = 0; i < N; i++) x[i] = 1;
+    tiled_multiply(&t, x, y, 3);
+    tiled_multiply_columns(&t, x, y);
+    tiled_multiply_lanes(&t, LANES, lanes, lanes + room * LANES, lanes + 2 * room * LANES, 1);
+    for (size_t i = 0; i < GUARD; i++) ck_assert_float_eq(y[room + i], kept);
+    tiled_free(&t);
+    tile_matrix_free(&m);
+    csr_free(&a);
+    free(x);
+    free(y);
+    free(lanes);
 }
 END_TEST
 
@@ -320,6 +379,7 @@ int main(void) {
     TCase *tests = tcase_create("products");
     tcase_add_loop_test(tests, products_are_right_and_do_not_depend_on_the_batch, 0, TILE_PLANES);
     tcase_add_test(tests, tiles_may_be_far_from_each_other);
+    tcase_add_test(tests, changed_tiles_stay_within_vectors);
     tcase_add_test(tests, rows_are_stored_in_tiles);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
