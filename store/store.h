@@ -70,8 +70,9 @@ lam_status store_seal(store *s, lam_error *error);
 /* Abandons a store being written, or closes one that was opened; NULL is allowed. */
 void store_close(store *s);
 
-/* Opens read only and checks that it is a sealed store of this version. The file is opened once; a child
- * process reads its headers (some ms, more for a process with much memory of its own), at most 30 s.
+/* Opens read only and checks that it is a sealed store of this version. The file is opened once. Headers that
+ * are not exactly as this library writes them, or damaged, are read by a child process (some ms, more for a
+ * process with much memory of its own), at most 30 s.
  * Errors: LAM_ERR_IO (also where no child can be started, or SIGCHLD is ignored), LAM_ERR_FORMAT (foreign or
  * truncated), LAM_ERR_VERSION, LAM_ERR_DAMAGED (also where HDF5 crashes or does not end), LAM_ERR_MEMORY. */
 lam_status store_open(const char *path, store **out, lam_error *error);

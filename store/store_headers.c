@@ -9,28 +9,27 @@
 /* The reply as it grows. */
 typedef struct reply {
     store *s;
-    char *bytes;
-    size_t size, capacity;
+    reply_buffer out;
     uint64_t n_objects, n_attributes;
     lam_status status; /* of the walk that runs */
     lam_error *error;
 } reply;
 
-static lam_status reply_add(reply *r, const void *data, size_t size, lam_error *error) {
-    if (size > REPLY_MOST_BYTES - r->size)
-        return status_fail(error, LAM_ERR_FORMAT, "%s: has more than %llu MiB of names and attributes",
-                           r->s->path, (unsigned long long)(REPLY_MOST_BYTES >> 20));
-    if (size > r->capacity - r->size) {
-        const size_t capacity = 2 * (r->size + size) + 4096;
+lam_status reply_add(reply_buffer *b, const char *path, const void *data, size_t size, lam_error *error) {
+    if (size > REPLY_MOST_BYTES - b->size)
+        return status_fail(error, LAM_ERR_FORMAT, "%s: has more than %llu MiB of names and attributes", path,
+                           (unsigned long long)(REPLY_MOST_BYTES >> 20));
+    if (size > b->capacity - b->size) {
+        const size_t capacity = 2 * (b->size + size) + 4096;
         char *bytes = memory_allocate(capacity, 1, "headers", error);
         if (bytes == NULL) return LAM_ERR_MEMORY;
-        if (r->size > 0) memcpy(bytes, r->bytes, r->size);
-        free(r->bytes);
-        r->bytes = bytes;
-        r->capacity = capacity;
+        if (b->size > 0) memcpy(bytes, b->bytes, b->size);
+        free(b->bytes);
+        b->bytes = bytes;
+        b->capacity = capacity;
     }
-    memcpy(r->bytes + r->size, data, size);
-    r->size += size;
+    if (size > 0) memcpy(b->bytes + b->size, data, size);
+    b->size += size;
     return LAM_OK;
 }
 
@@ -60,9 +59,9 @@ static lam_status send_attribute(reply *r, const char *name, hid_t id, lam_error
     if (record.kind != ATTRIBUTE_OTHER && H5Aread(id, type, text != NULL ? (void *)text : &record.value) < 0)
         TRY(store_hdf5_failure(s, name, "read the attribute", error));
     if (text != NULL && strlen(text) < REPLY_MOST_BYTES) record.text_bytes = (uint32_t)strlen(text) + 1;
-    TRY(reply_add(r, &record, sizeof record, error));
-    TRY(reply_add(r, name, record.name_bytes, error));
-    if (text != NULL) TRY(reply_add(r, text, strlen(text) + 1, error));
+    TRY(reply_add(&r->out, r->s->path, &record, sizeof record, error));
+    TRY(reply_add(&r->out, r->s->path, name, record.name_bytes, error));
+    if (text != NULL) TRY(reply_add(&r->out, r->s->path, text, strlen(text) + 1, error));
     r->n_attributes++;
 done:
     free(text);
@@ -158,7 +157,7 @@ static lam_status send_object(reply *r, const char *name, hid_t id, lam_error *e
     lam_error fault = {.message = ""};
     hsize_t from = 0;
     const uint64_t before = r->n_attributes;
-    const size_t start = r->size;
+    const size_t start = r->out.size;
     if (H5Iget_type(id) == H5I_DATASET) {
         const lam_status found = describe_array(r->s, name, id, &record, &fault);
         record.kind = OBJECT_ARRAY;
@@ -168,20 +167,20 @@ static lam_status send_object(reply *r, const char *name, hid_t id, lam_error *e
                                      .name_bytes = record.name_bytes,
                                      .fault_bytes = (uint32_t)strlen(fault.message) + 1};
     }
-    TRY(reply_add(r, &record, sizeof record, error));
-    TRY(reply_add(r, name, record.name_bytes, error));
-    if (record.fault_bytes > 0) TRY(reply_add(r, fault.message, record.fault_bytes, error));
+    TRY(reply_add(&r->out, r->s->path, &record, sizeof record, error));
+    TRY(reply_add(&r->out, r->s->path, name, record.name_bytes, error));
+    if (record.fault_bytes > 0) TRY(reply_add(&r->out, r->s->path, fault.message, record.fault_bytes, error));
     r->status = LAM_OK;
     if (H5Aiterate2(id, H5_INDEX_NAME, H5_ITER_INC, &from, attribute_visit, r) < 0) {
         TRY(r->status);
         TRY(store_hdf5_failure(r->s, name, "read the attributes of", error));
     }
     record.n_attributes = (uint32_t)(r->n_attributes - before);
-    memcpy(r->bytes + start, &record, sizeof record);
+    memcpy(r->out.bytes + start, &record, sizeof record);
     r->n_objects++;
 done:
     if (status != LAM_OK) { /* half an object is not sent */
-        r->size = start;
+        r->out.size = start;
         r->n_attributes = before;
     }
     return status;
@@ -273,8 +272,8 @@ void store_headers_send(store *s, int to) {
     memcpy(head.message, error.message, sizeof head.message);
     head.n_objects = r.n_objects;
     head.n_attributes = r.n_attributes;
-    head.bytes = r.size;
-    if (confined_send(to, &head, sizeof head)) (void)confined_send(to, r.bytes, r.size);
-    free(r.bytes);
+    head.bytes = r.out.size;
+    if (confined_send(to, &head, sizeof head)) (void)confined_send(to, r.out.bytes, r.out.size);
+    free(r.out.bytes);
     store_mute_end(&mute);
 }

@@ -1,6 +1,8 @@
-/* Opens a store for reading: the file once, by one descriptor; its headers by HDF5 in a child process that
- * has this descriptor and no right to anything else; then checks of all that the child sent. */
+/* Opens a store for reading: the file once, by one descriptor; its headers here where they are as `lambert`
+ * writes them (plain.h), else by HDF5 in a child process that has this descriptor and no right to anything
+ * else; then checks of all that either gave. */
 #include "store/groups.h"
+#include "store/plain.h"
 #include "store/store_private.h"
 
 #include <errno.h>
@@ -168,9 +170,32 @@ static lam_status check_sums(const store *s, lam_error *error) {
     return LAM_OK;
 }
 
+/* The headers of a store as `lambert` writes it, without HDF5 and so without a child. False: HDF5 is to say
+ * what the file is. */
+static bool read_plain(store *s, reply_head *head) {
+    char *bytes = NULL;
+    lam_error unused;
+    if (!plain_headers(s, head, &bytes)) return false;
+    if (store_reply_check(head, s->path, &unused) == LAM_OK)
+        return store_reply_read(head, s->path, s->file.size, bytes, &s->index, &unused) == LAM_OK;
+    free(bytes);
+    return false;
+}
+
+/* Children until one answers whole, or three did not. */
+static lam_status read_by_child(store *s, confined_main *run, const confined_limits *limits, reply_head *head,
+                                lam_error *error) {
+    for (int trial = 1;; trial++) {
+        bool again = false;
+        const lam_status status = read_once(s, run, limits, head, &again, error);
+        if (status == LAM_OK || !again || trial == TRIALS) return status;
+    }
+}
+
 /* Bytes of checksums, at most: of 8 TiB of arrays. */
 #define SUMS_MOST ((uint64_t)64 << 20)
 
+/* run NULL: a child is only needed where the file is not plain. */
 static lam_status open_within(const char *path, uint64_t memory, confined_main *run,
                               const confined_limits *limits, store **out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -180,12 +205,8 @@ static lam_status open_within(const char *path, uint64_t memory, confined_main *
     s->stop = limits->stop;
     s->memory = memory;
     TRY(open_file(s, error));
-    for (int trial = 1;; trial++) {
-        bool again = false;
-        status = read_once(s, run, limits, &head, &again, error);
-        if (status == LAM_OK || !again || trial == TRIALS) break;
-    }
-    TRY(status);
+    if (run != NULL || !read_plain(s, &head))
+        TRY(read_by_child(s, run != NULL ? run : headers_main(), limits, &head, error));
     TRY(check_root(s, &head, error));
     TRY(store_sums_read(s, error));
     TRY(check_sums(s, error));
@@ -205,7 +226,7 @@ lam_status store_open_within(const char *path, uint64_t memory, const stop_check
                              lam_error *error) {
     confined_limits limits = headers_limits;
     limits.stop = stop;
-    return open_within(path, memory < SUMS_MOST ? memory : SUMS_MOST, headers_main(), &limits, out, error);
+    return open_within(path, memory < SUMS_MOST ? memory : SUMS_MOST, NULL, &limits, out, error);
 }
 
 lam_status store_open(const char *path, store **out, lam_error *error) {

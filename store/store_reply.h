@@ -1,7 +1,7 @@
-/* The bytes that the reader of headers (store_headers.c, in a child) sends to the store (store_index.c): a
- * head, then for each object a record, its name, the words of a fault, and its attributes, each a record, its
- * name and its text. Names and texts end with a NUL. The root comes first. Both ends are one program, so
- * that numbers have its layout. */
+/* The bytes that a reader of headers (store_headers.c, in a child; plain_headers.c) gives to the store
+ * (store_index.c): a head, then for each object a record, its name, the words of a fault, and its attributes,
+ * each a record, its name and its text. Names and texts end with a NUL. The root comes first. Both ends are
+ * one program, so that numbers have its layout. */
 #ifndef LAMBERT_STORE_STORE_REPLY_H
 #define LAMBERT_STORE_STORE_REPLY_H
 
@@ -31,6 +31,15 @@ typedef struct reply_head {
     char message[sizeof((lam_error *)0)->message];
     uint64_t n_objects, n_attributes, bytes; /* bytes: of all that follows */
 } reply_head;
+
+/* The bytes behind the head as they grow; freed by the caller. */
+typedef struct reply_buffer {
+    char *bytes;
+    size_t size, capacity;
+} reply_buffer;
+
+/* Appends bytes. Errors: LAM_ERR_FORMAT where they would be more than REPLY_MOST_BYTES, LAM_ERR_MEMORY. */
+lam_status reply_add(reply_buffer *b, const char *path, const void *data, size_t size, lam_error *error);
 
 typedef struct object_record {
     uint32_t kind, status, name_bytes, fault_bytes, n_attributes;

@@ -10,6 +10,8 @@ import subprocess
 import tempfile
 import unittest
 
+import h5py
+
 from command import ENVIRONMENT, LAMBERT
 from daemon import LAMBERTD, PATIENCE, Daemon
 from make_store import Scene
@@ -88,6 +90,39 @@ class Opening(unittest.TestCase):
             self.assertEqual((done.returncode, done.stderr), (1, usual.stderr))
         done = self.run_program(LAMBERT, "info", self.store, preexec_fn=ignore_children)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+    def test_among_others(self):
+        """A daemon serves stores whose headers it reads itself and one that HDF5 is to read, and refuses the rest, each in the
+        words of `lambert info`."""
+        scene = self.store.with_name("room.obj")
+        folder = self.store.with_name("stores")
+        folder.mkdir()
+        for line in (("generate", "cornell", "--elements", 300, "-o", scene),
+                     ("precompute", scene, "-o", folder / "room.h5", "--method", "hierarchical", "--probes", 0, "--rays", 64)):
+            done = self.run_program(LAMBERT, *line)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        raw = (folder / "room.h5").read_bytes()
+        shutil.copy(folder / "room.h5", folder / "odd.h5")
+        with h5py.File(folder / "odd.h5", "r+") as f:
+            f.create_group("odd", track_order=True)
+        header = raw.index(b"OCHK")  # of the root
+        spoilt = {"cut": raw[:-100], "text": b"v 0 0 0\n" * 100, "empty": b"", "none": raw[:48] + bytes(len(raw) - 48),
+                  "header": raw[:header + 6] + bytes([raw[header + 6] ^ 1]) + raw[header + 7:]}
+        for name, content in spoilt.items():
+            (folder / f"{name}.h5").write_bytes(content)
+        said = []
+        for name in spoilt:
+            done = self.run_program(LAMBERT, "info", folder / f"{name}.h5")
+            self.assertEqual(done.returncode, 1)
+            said.append(done.stderr.strip().removeprefix("lambert info: "))
+        with Daemon("--stores", folder) as daemon:
+            scenes = [one["name"] for one in daemon.get("/v1/scenes").json()["scenes"]]
+            self.assertEqual(sorted(scenes), ["odd", "room"])
+            for line in said:
+                self.assertIn(f"refused {line}", daemon.errors())
+            answers = [daemon.post(f"/v1/scenes/{name}/radiosity", {"emission": {"groups": {"lamp": 1}}}).json()["radiosity"]
+                       for name in scenes]
+            self.assertEqual(answers[0], answers[1])
 
 
 if __name__ == "__main__":
