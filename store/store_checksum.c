@@ -205,7 +205,8 @@ lam_status store_array_load(store *s, const char *name, const store_array *array
     char *scratch = NULL;
     const store_sum *sum = store_sums_find_for(s, name, array, error);
     if (sum == NULL) TRY(LAM_ERR_DAMAGED);
-    if (data == NULL) {
+    const char *mapped = data == NULL && s->map != NULL ? store_map_at(s->map, array->offset) : NULL;
+    if (data == NULL && mapped == NULL) {
         scratch = memory_allocate(array->bytes < STORE_PIECE ? array->bytes : STORE_PIECE, 1, name, error);
         if (scratch == NULL) TRY(LAM_ERR_MEMORY);
     }
@@ -213,8 +214,8 @@ lam_status store_array_load(store *s, const char *name, const store_array *array
         size_t start = i * STORE_PIECE, size = piece_size(array->bytes, i);
         char *piece = data == NULL ? scratch : (char *)data + start;
         if (stop_asked(s->stop)) FAIL(error, LAM_ERR_CANCELLED, "%s: not read to its end", s->path);
-        TRY(store_data_read(s, name, array->offset + start, piece, size, error));
-        if (store_checksum(piece, size) != sum->pieces[i])
+        if (mapped == NULL) TRY(store_data_read(s, name, array->offset + start, piece, size, error));
+        if (store_checksum(mapped != NULL ? mapped + start : piece, size) != sum->pieces[i])
             FAIL(error, LAM_ERR_DAMAGED, "%s: %s is damaged in MiB %zu of %zu; make the store again", s->path,
                  name, i + 1, sum->n_pieces);
     }

@@ -18,6 +18,9 @@ typedef struct map_array {
     size_t n_pieces;
     size_t offset, bytes;
     store_type type;
+    store_check *check; /* NULL: none */
+    uint64_t limit;
+    const char *words;
 } map_array;
 
 struct store_map {
@@ -78,6 +81,14 @@ done:
     return status;
 }
 
+void store_map_populate(const store_map *map) {
+#ifdef MADV_POPULATE_READ /* since Linux 5.14 */
+    (void)madvise(map->base, map->file_bytes, MADV_POPULATE_READ);
+#else
+    (void)map;
+#endif
+}
+
 store_map *store_map_hold(store_map *map) {
     if (map != NULL) atomic_fetch_add(&map->references, 1);
     return map;
@@ -103,6 +114,10 @@ store_map *store_map_of(const store *s) {
 void store_map_range(const store_map *map, const void **begin, size_t *bytes) {
     *begin = map->base;
     *bytes = map->mapped_bytes;
+}
+
+const void *store_map_at(const store_map *map, uint64_t offset) {
+    return map->base + offset;
 }
 
 bool store_map_changed(const store_map *map) {
@@ -169,6 +184,17 @@ done:
     return status;
 }
 
+void store_view_check(const store_view *view, store_check *check, uint64_t limit, const char *words) {
+    store_map *map = view->map;
+    for (size_t i = 0; map != NULL && i < map->n_arrays; i++) {
+        map_array *array = &map->arrays[i];
+        if (map->base + array->offset != (const char *)view->data) continue;
+        array->check = check;
+        array->limit = limit;
+        array->words = words;
+    }
+}
+
 void store_view_free(store_view *view) {
     store_map_release(view->map);
     free(view->memory);
@@ -217,6 +243,9 @@ lam_status store_map_verify(const store_map *map, const stop_check *stop, lam_er
                 return damaged(map, array, p, "is damaged", error);
             if (!is_finite(array->type, piece, bytes))
                 return damaged(map, array, p, "has a number that is not finite", error);
+            if (array->check != NULL &&
+                !array->check(map->base + array->offset, start, start + bytes, array->limit))
+                return damaged(map, array, p, array->words, error);
         }
     }
     return LAM_OK;

@@ -23,6 +23,10 @@ typedef struct store_map store_map;
  * LAM_ERR_MEMORY, LAM_ERR_IO. */
 lam_status store_map_file(store *s, lam_error *error);
 
+/* Has the pages of the file that are in memory, or on the disk, all mapped at once, which costs less than one
+ * by one when they are used. Any thread; nothing is wrong where it fails. */
+void store_map_populate(const store_map *map);
+
 /* An array in a mapping, which is held for the caller, or in memory of its own; freed by store_view_free. */
 typedef struct store_view {
     const void *data;
@@ -35,6 +39,12 @@ typedef struct store_view {
  * type, rank, dims as there. Errors: as store_read. */
 lam_status store_read_view(store *s, const char *name, store_type type, int rank, size_t *dims,
                            store_view *view, lam_error *error);
+
+/* Has store_map_verify look at a mapped array, too, for what `limit` rules out: `check` is given its data and
+ * the bytes [from, to) that are compared just then, and says if what ends there is good. words, static, say
+ * what is wrong. Nothing happens for a view in memory. */
+typedef bool store_check(const void *data, size_t from, size_t to, uint64_t limit);
+void store_view_check(const store_view *view, store_check *check, uint64_t limit, const char *words);
 
 /* Frees a view; a zeroed one is allowed. */
 void store_view_free(store_view *view);
@@ -56,7 +66,8 @@ bool store_map_changed(const store_map *map);
 /* Bytes of the arrays that store_read_view gave out of the mapping. */
 size_t store_map_bytes(const store_map *map);
 
-/* Compares these arrays with their checksums, and looks for numbers that are not finite, until `stop` says so
+/* Compares these arrays with their checksums, and looks for numbers that are not finite, or fail the check of
+ * their view, until `stop` says so
  * (LAM_ERR_CANCELLED; it is asked before each MiB, and may be NULL). Any thread, after the last
  * store_read_view. LAM_ERR_DAMAGED names the file, the array and its MiB. */
 lam_status store_map_verify(const store_map *map, const stop_check *stop, lam_error *error);

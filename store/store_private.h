@@ -185,8 +185,11 @@ lam_status store_sums_read(store *s, lam_error *error);
 lam_status store_data_read(store *s, const char *name, uint64_t offset, void *data, size_t bytes,
                            lam_error *error);
 
-/* Reads an array into data (NULL: nowhere) and compares it with its checksums. LAM_ERR_CANCELLED where the
- * store's `stop` says so. */
+/* The byte of a mapped file at an offset within it. */
+const void *store_map_at(const store_map *map, uint64_t offset);
+
+/* Reads an array into data (NULL: nowhere, or in the mapping) and compares it with its checksums.
+ * LAM_ERR_CANCELLED where the store's `stop` says so. */
 lam_status store_array_load(store *s, const char *name, const store_array *array, void *data,
                             lam_error *error);
 

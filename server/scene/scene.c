@@ -57,31 +57,61 @@ static void scene_health_free(scene_health *health) {
     free(health);
 }
 
-/* Guards the mapping (NULL: none). sound: it has been compared with its checksums already. Freed by
- * scene_health_free while the mapping still exists. Errors: LAM_ERR_MEMORY. */
-static lam_status scene_health_create(const char *path, const store_map *map, bool sound, scene_health **out,
+/* Guards a mapping, of which nothing was compared yet. Freed by scene_health_free while the mapping still
+ * exists. Errors: LAM_ERR_MEMORY. */
+static lam_status scene_health_create(const char *path, const store_map *map, scene_health **out,
                                       lam_error *error) {
     lam_status status = LAM_OK;
+    const void *begin;
+    size_t bytes;
     scene_health *made = memory_allocate(1, sizeof *made, path, error);
     if (made == NULL) return LAM_ERR_MEMORY;
-    atomic_init(&made->state, sound || map == NULL ? HEALTH_SOUND : HEALTH_UNKNOWN);
+    atomic_init(&made->state, HEALTH_UNKNOWN);
     atomic_init(&made->reported, false);
-    atomic_init(&made->verified_at, sound ? (long long)time(NULL) : 0);
+    atomic_init(&made->verified_at, 0);
     atomic_init(&made->doubted_at, NEVER_DOUBTED);
-    if (map != NULL) {
-        const void *begin;
-        size_t bytes;
-        store_map_range(map, &begin, &bytes);
-        made->guard = map_guard_add(begin, bytes);
-        if (made->guard == NULL)
-            FAIL(error, LAM_ERR_MEMORY, "%s: more than %d stores are mapped; serve fewer", path,
-                 MAP_GUARD_RANGES);
-    }
+    store_map_range(map, &begin, &bytes);
+    made->guard = map_guard_add(begin, bytes);
+    if (made->guard == NULL)
+        FAIL(error, LAM_ERR_MEMORY, "%s: more than %d stores are mapped; serve fewer", path,
+             MAP_GUARD_RANGES);
     *out = made;
     made = NULL;
 done:
     scene_health_free(made);
     return status;
+}
+
+/* Maps the store, so that it is guarded before anything in it is read. */
+static lam_status map_store(store *s, const scene_options *options, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(store_map_file(s, error));
+    made->map = store_map_hold(store_map_of(s));
+    TRY(scene_health_create(made->path, made->map, &made->health, error));
+    if (store_identity_of(s)->size < options->verify_below) store_map_populate(made->map);
+done:
+    return status;
+}
+
+/* Compares mapped arrays, if that is to be done before the scene is served, and lets a mapping go that
+ * nothing is used of. Only here is it known which numbers are mapped, which must be finite. */
+static lam_status settle_map(const scene_options *options, scene *made, lam_error *error) {
+    scene_health *health = made->health;
+    const size_t mapped = store_map_bytes(made->map);
+    if (mapped == 0) {
+        map_guard_remove(health->guard);
+        health->guard = NULL;
+        store_map_release(made->map);
+        made->map = NULL;
+    }
+    const bool first = options->verify || mapped < options->verify_below;
+    if (mapped > 0 && first) {
+        const lam_status status = store_map_verify(made->map, options->stop, error);
+        if (status != LAM_OK) return status;
+    }
+    if (first) atomic_store(&health->verified_at, (long long)time(NULL));
+    if (mapped == 0 || first) atomic_store(&health->state, HEALTH_SOUND);
+    return LAM_OK;
 }
 
 /* *text: the description of the store under the name that it is served by, one line of JSON, freed by the
@@ -254,8 +284,9 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
              (unsigned long long)options->memory);
     TRY(weather_file_read(options->path, options->memory - made->memory, &made->weather, error));
     made->memory += made->weather.length;
-    TRY(store_verify_group(s, options->verify ? "/" : STORE_MESH, error));
-    TRY(store_map_file(s, error));
+    if (options->verify) TRY(store_verify(s, error));
+    TRY(map_store(s, options, made, error));
+    if (!options->verify) TRY(store_verify_group(s, STORE_MESH, error));
     TRY(operator_load(s, &made->op, error));
     made->n = lam_operator_elements(made->op);
     made->n_channels = lam_operator_channels(made->op);
@@ -269,7 +300,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(group_index_of_emitters(made->op, &made->emitters, error));
     TRY(group_index_load(s, made->n, &made->groups, error));
-    TRY(areas_load(s, made->n, &made->area, error));
+    TRY(areas_view(s, made->n, &made->areas, error));
+    made->area = made->areas.data;
     TRY(group_index_measure(&made->groups, made->area, error));
     TRY(group_emission_read(s, made, &made->group_emission, error));
     TRY(scene_lights_load(s, &made->lights, error));
@@ -290,11 +322,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     TRY(scene_corners_create(made, made->ledger, &made->corners, error));
     if (made->sky_tiling[0] != '\0' && store_has_attribute(s, STORE_SKY, "ground_albedo"))
         TRY(scene_sun_create(s, made, &made->sun, error));
-    if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
-    const bool first = options->verify || store_map_bytes(store_map_of(s)) < options->verify_below;
-    TRY(scene_health_create(made->path, made->map, first, &made->health, error));
-    /* Under the guard just made. Only here is it known which numbers are mapped, which must be finite. */
-    if (first && made->map != NULL) TRY(store_map_verify(made->map, options->stop, error));
+    TRY(settle_map(options, made, error));
 done:
     return status;
 }
@@ -430,7 +458,7 @@ void scene_release(scene *s) {
         group_index_free(&s->groups);
         group_index_free(&s->emitters);
         face_index_free(&s->faces);
-        free(s->area);
+        store_view_free(&s->areas);
         free(s->group_emission);
         stated_errors_free(&s->errors);
         free(s->group_read);

@@ -44,7 +44,8 @@ struct scene {
     light_kind lights;
     group_index emitters;            /* by name */
     face_index faces;                /* of the scene file; empty: the store does not know them */
-    double *area;                    /* [n], m^2 */
+    const double *area;              /* [n], m^2 */
+    store_view areas;                /* they hold it, mapped or in memory */
     double *group_emission;          /* [n_groups][C], the scene's own (group_emission_read) */
     lam_limiter limiter;             /* of answers below zero; it borrows groups and areas */
     lam_sky *sky;                    /* NULL: none */

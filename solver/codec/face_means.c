@@ -27,7 +27,7 @@ static void count_entries(const face_index *f, uint32_t *counts) {
 
 /* Fills the entries from the last element on, so that those of a face ascend; start holds the ends of faces,
  * which become the beginnings. */
-static void fill_entries(face_index *f, const double *area) {
+static void fill_entries(face_index *f) {
     size_t p = f->of.n_parts;
     for (size_t i = f->n_fronts; i-- > 0;) {
         const uint32_t face = f->of.of[i];
@@ -40,14 +40,15 @@ static void fill_entries(face_index *f, const double *area) {
         if (face == SCENE_FACE_NONE) continue;
         const uint32_t at = --f->start[face];
         f->element[at] = (uint32_t)i;
-        f->area[at] = area[i];
+        if (f->area != NULL) f->area[at] = f->own[i];
     }
 }
 
 lam_status face_index_make(size_t n, size_t n_fronts, const double *area, scene_faces *faces, face_index *out,
                            lam_error *error) {
     lam_status status = LAM_OK;
-    face_index made = {.n_faces = faces->of != NULL ? faces->n_faces : 0, .n = n, .n_fronts = n_fronts};
+    face_index made = {
+        .n_faces = faces->of != NULL ? faces->n_faces : 0, .n = n, .n_fronts = n_fronts, .own = area};
     made.of = *faces;
     *faces = (scene_faces){.n_faces = 0};
     *out = (face_index){.n_faces = 0};
@@ -60,9 +61,12 @@ lam_status face_index_make(size_t n, size_t n_fronts, const double *area, scene_
     for (size_t f = 0; f < made.n_faces; f++) made.start[f + 1] += made.start[f];
     made.n_entries = made.start[made.n_faces];
     made.element = memory_allocate(made.n_entries, sizeof *made.element, "faces", error);
-    made.area = memory_allocate(made.n_entries, sizeof *made.area, "faces", error);
-    if (made.element == NULL || made.area == NULL) TRY(LAM_ERR_MEMORY);
-    fill_entries(&made, area);
+    if (made.element == NULL) TRY(LAM_ERR_MEMORY);
+    if (made.of.n_parts > 0) {
+        made.area = memory_allocate(made.n_entries, sizeof *made.area, "faces", error);
+        if (made.area == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    fill_entries(&made);
     *out = made;
     made = (face_index){.n_faces = 0};
 done:
@@ -163,9 +167,10 @@ static double mean_of(const face_index *f, size_t face, const row *x, size_t at,
     for (uint32_t e = first; e < end; e++) {
         const double value = value_at(x, at == SIZE_MAX ? f->element[e] : at + (e - first));
         if (end - first == 1) return isnan(value) ? (double)INFINITY : value;
-        sum += f->area[e] * value;
-        size += f->area[e] * fabs(value);
-        area += f->area[e];
+        const double part = face_index_area(f, e);
+        sum += part * value;
+        size += part * fabs(value);
+        area += part;
     }
     *rounding = fmax(*rounding, (2. * (end - first) + 2) * 0x1p-53 * (size / area));
     return isnan(sum) ? (double)INFINITY : sum / area;

@@ -15,12 +15,19 @@ typedef struct face_index {
     size_t n_entries;  /* of all faces */
     uint32_t *start;   /* [n_faces + 1], into the entries of a face: */
     uint32_t *element; /* [n_entries], ascending */
-    double *area;      /* [n_entries], a_if, m^2 */
+    double *area;      /* [n_entries], a_if, m^2; NULL where no element is a part of several faces: */
+    const double *own; /* [n], area of elements, borrowed */
     scene_faces of;
 } face_index;
 
-/* Makes the index of n elements, of which the first n_fronts are fronts; area is [n]. Takes faces over, also
- * on an error; those that are not known make an empty index. O(n + faces). Errors: LAM_ERR_MEMORY. */
+/* a_if of an entry. */
+static inline double face_index_area(const face_index *f, size_t entry) {
+    return f->area != NULL ? f->area[entry] : f->own[f->element[entry]];
+}
+
+/* Makes the index of n elements, of which the first n_fronts are fronts; area is [n] and outlives the index.
+ * Takes faces over, also on an error; those that are not known make an empty index. O(n + faces). Errors:
+ * LAM_ERR_MEMORY. */
 lam_status face_index_make(size_t n, size_t n_fronts, const double *area, scene_faces *faces, face_index *out,
                            lam_error *error);
 void face_index_free(face_index *f);

@@ -218,7 +218,15 @@ lam_status hierarchical_load(store *s, size_t n, size_t n_channels, const float 
     TRY(hierarchical_begin(n, n_channels, reflectance, &self, error));
     TRY(read_source(s, n, n_channels, &from, error));
     self->n_groups = from.n_groups;
-    TRY(hierarchical_make(self, &from, error));
+    status = hierarchical_make(self, &from, error);
+    if (status == LAM_ERR_NUMERIC && in_place) {
+        /* A block of what is mapped that is not as it was written is the cause, where there is one. */
+        const lam_error cause = *error;
+        TRY(store_verify_group(s, STORE_OPERATOR, error));
+        *error = cause;
+        status = LAM_ERR_NUMERIC;
+    }
+    TRY(status);
     for (size_t c = 0; c < n_channels; c++) {
         char group[48];
         snprintf(group, sizeof group, STORE_OPERATOR "/K/%zu", c);

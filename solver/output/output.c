@@ -120,7 +120,7 @@ void output_column(const solution *s, size_t vector, size_t channel, char name[O
 const char *output_face_group(const solution *s, size_t face, double *area) {
     const face_index *f = s->faces;
     *area = 0;
-    for (uint32_t e = f->start[face]; e < f->start[face + 1]; e++) *area += f->area[e];
+    for (uint32_t e = f->start[face]; e < f->start[face + 1]; e++) *area += face_index_area(f, e);
     if (f->start[face] == f->start[face + 1]) return NULL;
     return s->m->group_names[s->m->group[f->element[f->start[face]]]];
 }

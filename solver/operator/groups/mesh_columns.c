@@ -8,19 +8,22 @@
 
 #define NO_VERTEX UINT32_MAX
 
-lam_status areas_load(store *s, size_t n, double **out, lam_error *error) {
+lam_status areas_view(store *s, size_t n, store_view *out, lam_error *error) {
     lam_status status = LAM_OK;
-    void *read = NULL;
-    TRY(store_read(s, STORE_MESH "/area", STORE_F64, 1, (size_t[]){n}, &read, error));
-    const double *area = read;
+    store_view read = {.data = NULL};
+    TRY(store_read_view(s, STORE_MESH "/area", STORE_F64, 1, (size_t[]){n}, &read, error));
+    const double *area = read.data;
     for (size_t i = 0; i < n; i++)
-        if (!(area[i] >= 0 && isfinite(area[i])))
+        if (!(area[i] >= 0 && isfinite(area[i]))) {
+            /* A block that is not as it was written is the cause, where there is one. */
+            TRY(store_verify_group(s, STORE_MESH, error));
             FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/area[%zu] = %g, must be at least 0", store_path(s), i,
                  area[i]);
+        }
     *out = read;
-    read = NULL;
+    read = (store_view){.data = NULL};
 done:
-    free(read);
+    store_view_free(&read);
     return status;
 }
 

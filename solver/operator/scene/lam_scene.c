@@ -16,7 +16,8 @@ static lam_status read_mesh(store *s, lam_scene *made, lam_error *error) {
     light_kind lights;
     void *normal = NULL;
     TRY(group_index_load(s, made->n, &made->groups, error));
-    TRY(areas_load(s, made->n, &made->area, error));
+    TRY(areas_view(s, made->n, &made->areas, error));
+    made->area = made->areas.data;
     TRY(group_index_measure(&made->groups, made->area, error));
     TRY(centres_load(s, made->n, &made->centre, error));
     TRY(store_read(s, STORE_MESH "/normal", STORE_F32, 2, (size_t[]){made->n, 3}, &normal, error));
@@ -96,7 +97,7 @@ void lam_scene_close(lam_scene *scene) {
     lam_luminaires_close(scene->luminaires);
     lam_sky_close(scene->sky);
     lam_operator_close(scene->op);
-    free(scene->area);
+    store_view_free(&scene->areas);
     free(scene->normal);
     free(scene->centre);
     free(scene);

@@ -16,7 +16,8 @@ struct lam_scene {
     lam_sky *sky;
     lam_luminaires *luminaires;
     group_index groups; /* measured */
-    double *area;
+    const double *area; /* [n] */
+    store_view areas;   /* they hold it */
     float *normal, *centre;
     const char *lights;
     stated_errors errors;

@@ -236,8 +236,8 @@ lam_status wavelets_make(const wavelet_arrays *from, size_t n, wavelets *out, la
     float *const taken_basis = basis;
     shapes = NULL;
     basis = NULL;
-    TRY(wavelets_create(n, from->n_nodes, nodes, from->n_shapes, taken_shapes, taken_basis,
-                        from->basis_count, out, error));
+    TRY(wavelets_create(n, from->n_nodes, nodes, from->n_shapes, taken_shapes, taken_basis, from->basis_count,
+                        out, error));
 done:
     free(shapes);
     free(basis);

@@ -48,9 +48,7 @@ static void setup(fixture *f, size_t rows) {
     f->s.n = N;
     f->s.n_channels = C;
     f->s.reflectance = reflectance;
-    f->s.area = malloc(sizeof area);
-    ck_assert_ptr_nonnull(f->s.area);
-    memcpy(f->s.area, area, sizeof area);
+    f->s.area = area;
     atomic_init(&f->ledger.room, SIZE_MAX);
     ck_assert_int_eq(row_cache_create(rows * row_size, &f->ledger, &f->s.rows, NULL), LAM_OK);
     ck_assert_uint_eq(adjoint_rows_capacity(&f->s), rows);
@@ -61,7 +59,6 @@ static void teardown(fixture *f) {
     ck_assert_uint_eq(atomic_load(&f->ledger.taken), 0);
     lam_operator_close(f->s.op);
     group_index_free(&f->s.groups);
-    free(f->s.area);
     free(f->workspace.bytes);
 }
 

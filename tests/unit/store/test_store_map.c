@@ -242,6 +242,45 @@ START_TEST(every_type_is_looked_at_as_what_it_is) {
 }
 END_TEST
 
+/* Bytes up to the limit; each is looked at once. */
+static size_t n_seen;
+
+static bool are_small(const void *data, size_t from, size_t to, uint64_t limit) {
+    const unsigned char *bytes = data;
+    ck_assert_uint_eq(from, n_seen);
+    n_seen = to;
+    for (size_t i = from; i < to; i++)
+        if (bytes[i] > limit) return false;
+    return true;
+}
+
+START_TEST(a_view_can_have_a_check) {
+    const size_t bytes = ((size_t)2 << 20) + 100;
+    unsigned char *values = calloc(bytes, 1);
+    values[bytes - 1] = 7;
+    for (uint64_t limit = 6; limit <= 7; limit++) {
+        store *s = NULL;
+        store_view view = {.data = NULL};
+        lam_error error = {.message = ""};
+        ck_assert(store_create(path, &s, &error) == LAM_OK);
+        ck_assert(store_write(s, "/a/bytes", STORE_I8, 1, &bytes, values, &error) == LAM_OK);
+        ck_assert_msg(store_seal(s, &error) == LAM_OK, "%s", error.message);
+        s = open_mapped();
+        ck_assert(store_read_view(s, "/a/bytes", STORE_I8, 1, (size_t[]){bytes}, &view, &error) == LAM_OK);
+        store_map_populate(view.map);
+        store_view_check(&view, are_small, limit, "has a large byte");
+        n_seen = 0;
+        const lam_status status = store_map_verify(view.map, NULL, &error);
+        ck_assert_uint_eq(n_seen, bytes);
+        ck_assert(status == (limit < 7 ? LAM_ERR_DAMAGED : LAM_OK));
+        ck_assert(limit == 7 || strstr(error.message, "/a/bytes has a large byte in MiB 3 of 3") != NULL);
+        store_view_free(&view);
+        store_close(s);
+    }
+    free(values);
+}
+END_TEST
+
 START_TEST(places_have_names) {
     write_store();
     const size_t begin = (size_t)place_of_large();
@@ -332,6 +371,7 @@ int main(void) {
     tcase_add_test(tests, a_flipped_bit_is_named);
     tcase_add_test(tests, a_number_that_is_not_finite_is_named);
     tcase_add_test(tests, every_type_is_looked_at_as_what_it_is);
+    tcase_add_test(tests, a_view_can_have_a_check);
     tcase_add_test(tests, places_have_names);
     tcase_add_test(tests, a_comparison_can_be_stopped);
     tcase_add_test(tests, a_truncated_file_is_refused);
