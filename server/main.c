@@ -55,7 +55,22 @@ static void forbid_teams(char **argv) {
 static void share_one_heap(void) {
     (void)mallopt(M_ARENA_MAX, 1);
     (void)mallopt(M_MMAP_THRESHOLD, LONGEST_IN_HEAP);
-    (void)mallopt(M_TRIM_THRESHOLD, 4 * LONGEST_IN_HEAP);
+}
+
+/* The heap keeps a sixteenth of what requests may take, within these limits, at its end while requests come.
+ * Of 16 MiB sixteen clients have no use that ask for two megabytes each: their pages are then given back and
+ * taken again with every answer, which costs more than the solve. */
+#define LEAST_KEPT ((size_t)16 << 20)
+#define MOST_KEPT ((size_t)128 << 20)
+
+static void keep_heap(size_t max_request_memory) {
+    const size_t share = max_request_memory / 16, most = share < MOST_KEPT ? share : MOST_KEPT;
+    (void)mallopt(M_TRIM_THRESHOLD, (int)(most > LEAST_KEPT ? most : LEAST_KEPT));
+}
+
+/* Gives back what the heap keeps. */
+static void trim_heap(void) {
+    (void)malloc_trim(0);
 }
 
 /* Blocks the signals that the main thread waits for, before any thread starts, so that no thread gets them.
@@ -201,6 +216,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     if (labels == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < route_label_count(); i++) labels[i] = route_label(i);
     atomic_init(&s.state, SERVICE_LOADING);
+    keep_heap(c->max_request_memory);
     request_ledger_init(&s.memory, c->max_request_memory, c->max_buffered);
     TRY(peer_rules_read(&c->trusted_proxies, &s.peers, error));
     if (c->token_file != NULL) TRY(tokens_open(c->token_file, stderr, &s.tokens, error));
@@ -219,6 +235,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
                 c->threads);
     if (c->threads_why[0] != '\0')
         printf("%zu thread%s: %s\n", batch_threads(s.queue), c->threads == 1 ? "" : "s", c->threads_why);
+    batch_when_resting(s.queue, trim_heap);
     batch_lend(s.queue);
     TRY(c->unix_path != NULL ? listener_open_unix(c->unix_path, &listen_fd, where, sizeof where, &own, error)
                              : listener_open_tcp(c->listen_address, &listen_fd, where, sizeof where, error));

@@ -7,6 +7,7 @@
 #include "server/queue/thread_budget.h"
 #include "solver/base/clock.h"
 
+#include <errno.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -41,6 +42,7 @@ struct batch_queue {
     bool spare_asleep; /* until a job comes */
     pthread_t spare_thread;
     worker spare;
+    void (*rest)(void); /* or NULL */
     thread_budget budget;
     size_t n_threads;
     pthread_t *threads; /* [n_threads] */
@@ -249,11 +251,28 @@ static struct timespec later(struct timespec t, double seconds) {
     return t;
 }
 
+/* Sleeps until a job comes. Once there was none for BATCH_REST after some, it calls `rest` first. */
+static void sleep_without_jobs(batch_queue *queue, uint64_t *rested) {
+    if (queue->rest != NULL && *rested != queue->order.n_submitted) {
+        const struct timespec end = later(clock_now(), BATCH_REST);
+        if (pthread_cond_timedwait(&queue->spare_changed, &queue->lock, &end) != ETIMEDOUT ||
+            queue->order.n_jobs > 0)
+            return;
+        *rested = queue->order.n_submitted;
+        pthread_mutex_unlock(&queue->lock);
+        queue->rest();
+        pthread_mutex_lock(&queue->lock);
+        return;
+    }
+    pthread_cond_wait(&queue->spare_changed, &queue->lock);
+}
+
 /* The spare thread. It looks at the jobs also when all others are in functions, or in one that takes longer
  * than was estimated: then as soon as that counts as long. */
 static void *serve_short(void *argument) {
     worker *w = argument;
     batch_queue *queue = w->queue;
+    uint64_t rested = 0;
     pthread_mutex_lock(&queue->lock);
     thread_budget_join(&queue->budget, 0); /* it asks for help and gives none */
     for (;;) {
@@ -264,7 +283,7 @@ static void *serve_short(void *argument) {
         queue->spare_idle = true;
         queue->spare_asleep = queue->order.n_jobs == 0;
         if (queue->spare_asleep)
-            pthread_cond_wait(&queue->spare_changed, &queue->lock);
+            sleep_without_jobs(queue, &rested);
         else
             pthread_cond_timedwait(&queue->spare_changed, &queue->lock, &next);
         queue->spare_idle = queue->spare_asleep = false;
@@ -394,6 +413,12 @@ size_t batch_jobs(batch_queue *queue) {
 
 size_t batch_threads(const batch_queue *queue) {
     return queue->n_threads;
+}
+
+void batch_when_resting(batch_queue *queue, void (*rest)(void)) {
+    pthread_mutex_lock(&queue->lock);
+    queue->rest = rest;
+    pthread_mutex_unlock(&queue->lock);
 }
 
 void batch_lend(batch_queue *queue) {

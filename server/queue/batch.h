@@ -50,6 +50,9 @@ typedef struct batch_workspace {
 /* Seconds between two looks at a job that waits. */
 #define BATCH_LOOK 50e-3
 
+/* Seconds without a job after which a queue rests. */
+#define BATCH_REST 1.0
+
 /* Vectors first ... first + count of a job, in a pass. */
 typedef struct batch_part {
     batch_job *job;
@@ -131,6 +134,10 @@ double batch_delay(batch_queue *queue);
 
 /* The threads that were started, without the one for short jobs. */
 size_t batch_threads(const batch_queue *queue);
+
+/* From now on a thread of the queue calls `rest` whenever there was no job for BATCH_REST, once after the
+ * last one; jobs may come meanwhile. Before any is submitted. */
+void batch_when_resting(batch_queue *queue, void (*rest)(void));
 
 /* From now on idle threads help the calling one, which is none of the queue, with its loops. */
 void batch_lend(batch_queue *queue);

@@ -218,6 +218,33 @@ START_TEST(brief_ones_come_evenly) {
 }
 END_TEST
 
+static sem_t rests;
+
+static void count_rest(void) {
+    sem_post(&rests);
+}
+
+/* The queue rests once after each time in which jobs came, and before any has come not at all. */
+START_TEST(it_rests_once_after_jobs) {
+    stage s;
+    job jobs[2];
+    int left = 1;
+    sem_init(&rests, 0, 0);
+    stage_open(&s, 1, MOST_JOBS);
+    batch_when_resting(s.queue, count_rest);
+    for (size_t k = 0; k < 2; k++) {
+        ck_assert(submit(&s, &jobs[k], k, 1, "scene"));
+        let_go(&s, 1);
+        wait_for(&s.finished, 1);
+        wait_for(&rests, 1);
+    }
+    stage_close(&s);
+    ck_assert_int_eq(sem_getvalue(&rests, &left), 0);
+    ck_assert_int_eq(left, 0);
+    sem_destroy(&rests);
+}
+END_TEST
+
 /* Jobs of different keys share no pass; two threads let them go side by side. */
 START_TEST(keys_have_passes_of_their_own) {
     stage s;
@@ -379,6 +406,7 @@ int main(void) {
     tcase_add_test(tests, a_long_request_holds_up_no_short_one);
     tcase_add_test(tests, a_pass_holds_sixteen);
     tcase_add_loop_test(tests, brief_ones_come_evenly, 1, 41);
+    tcase_add_test(tests, it_rests_once_after_jobs);
     tcase_add_test(tests, keys_have_passes_of_their_own);
     tcase_add_test(tests, who_wants_no_pass_waits_for_none);
     tcase_add_test(tests, places_are_counted);
