@@ -152,10 +152,12 @@ class Local(Emissions):
         """[m, C, receivers]: NaN where a receiver has no value."""
         read = self.store.sensors
         assert read is not None
-        count = len(read["receiver"])
-        i = np.repeat(np.arange(count), np.diff(read["indptr"].astype(int)))
-        j, weights = read["indices"].astype(int), read["weights"].astype(float)
-        made = np.stack([np.stack([np.bincount(i, weights * b[j], count) for b in row]) for row in B])
+        start, weights = read["indptr"].astype(int), read["weights"]
+        rows = np.flatnonzero(np.diff(start))  # of a row without entries reduceat would give the next one's first
+        made = np.zeros((*B.shape[:2], len(read["receiver"])))
+        if rows.size:
+            for m, c in np.ndindex(*B.shape[:2]):
+                made[m, c, rows] = np.add.reduceat(weights * B[m, c][read["indices"]], start[rows])
         if light.L is not None and "sky" in read:
             made += light.L @ read["sky"].astype(float)
         if light.D is not None and "luminaires" in read and self.store.luminaires is not None:
