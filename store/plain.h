@@ -4,7 +4,7 @@
  * another writer, is left to HDF5 in a child process (store_open.c): nothing here says what is wrong.
  *
  * Every number comes from outside. Blocks are copied before they are looked at, as a file may change; sizes
- * and depths are bounded, and so is the number of blocks, so that no file takes more than some milliseconds.
+ * and depths are bounded, and so is the number of blocks, so that no file takes more than a second.
  */
 #ifndef LAMBERT_STORE_PLAIN_H
 #define LAMBERT_STORE_PLAIN_H
