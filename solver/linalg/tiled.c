@@ -412,7 +412,8 @@ uint64_t tiled_few(const tiled_rows *t) {
 
 /* Adds the fours of the columns of a group to *met, unless X is 0 there. */
 static void meet(const tiled_rows *t, size_t g, const float *scaled, uint64_t *met) {
-    if (!is_dark(t, g, scaled)) *met += tiled_begin(t, (g + 1) * t->n_planes) - tiled_begin(t, g * t->n_planes);
+    if (!is_dark(t, g, scaled))
+        *met += tiled_begin(t, (g + 1) * t->n_planes) - tiled_begin(t, g * t->n_planes);
 }
 
 bool tiled_few_columns(const tiled_rows *t, const float *scaled) {
