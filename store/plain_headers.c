@@ -2,6 +2,7 @@
  * give about them (plain.h, store_reply.h). */
 #include "store/plain.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -354,11 +355,9 @@ static bool write_tree(plain_reply *r, const char *name, uint64_t address, size_
     const size_t length = strcmp(name, "/") == 0 ? 0 : strlen(name);
     for (size_t k = 0; good && k < o->n_links; k++) {
         const char *last = o->links[k].name;
-        good = length + 1 + strlen(last) < sizeof below && strchr(last, '/') == NULL;
+        const int written = snprintf(below, sizeof below, "%.*s/%s", (int)length, name, last);
+        good = written > 0 && (size_t)written < sizeof below && strchr(last, '/') == NULL;
         if (!good) break;
-        memcpy(below, name, length);
-        below[length] = '/';
-        strcpy(below + length + 1, last);
         good = write_tree(r, below, o->links[k].address, depth + 1);
     }
     free(o->texts);

@@ -121,7 +121,8 @@ static inline char *place(char *at, uint32_t bits, const decimal *d) {
 /* Zero, of either sign, and numbers that are not finite. */
 static char *place_special(char *at, uint32_t magnitude) {
     const bool zero = magnitude == 0;
-    memcpy(at, zero ? "0   " : "null", 4);
+    const uint32_t text = zero ? 0x20202030u : 0x6C6C756Eu; /* a zero and blanks, or null */
+    memcpy(at, &text, sizeof text);
     return at + (zero ? 1 : 4);
 }
 
