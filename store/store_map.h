@@ -67,9 +67,8 @@ bool store_map_changed(const store_map *map);
 size_t store_map_bytes(const store_map *map);
 
 /* Compares these arrays with their checksums, and looks for numbers that are not finite, or fail the check of
- * their view, until `stop` says so
- * (LAM_ERR_CANCELLED; it is asked before each MiB, and may be NULL). Any thread, after the last
- * store_read_view. LAM_ERR_DAMAGED names the file, the array and its MiB. */
+ * their view, until `stop` says so (LAM_ERR_CANCELLED; it is asked before each MiB, and may be NULL). Any
+ * thread, after the last store_read_view. LAM_ERR_DAMAGED names the file, the array and its MiB. */
 lam_status store_map_verify(const store_map *map, const stop_check *stop, lam_error *error);
 
 /* The message for an offset in the mapping: names the array and the MiB, as store_map_verify does, or,

@@ -11,8 +11,8 @@
 #endif
 
 /* Groups that a thread takes at a time; fours below which one thread works; fours whose digits are converted
- * at once; digits of a row of a four, and those behind them that a register has too: of
- * the four that follows, which is always there. */
+ * at once; digits of a row of a four, and those behind them that a register has too, in the last row of the
+ * four that follows, which is always there. */
 enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 200, CHUNK = 32, DIGITS = 16 };
 
 #define KERNEL(name) name##_portable

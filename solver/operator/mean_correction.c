@@ -43,22 +43,6 @@ static lam_status reserve(size_t n, size_t n_channels, mean_correction *e, lam_e
     return e->missing != NULL && e->light != NULL ? LAM_OK : LAM_ERR_MEMORY;
 }
 
-lam_status mean_correction_create(size_t n, size_t n_channels, const double *missing, const double *light,
-                                  mean_correction *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    mean_correction e = {.n = 0};
-    TRY(reserve(n, n_channels, &e, error));
-    for (size_t k = 0; k < n * n_channels; k++)
-        e.missing[k] = float_of_half(half_of_float((float)missing[k]));
-    memcpy(e.light, light, n_channels * sizeof *light);
-    TRY(check(&e, error));
-    *out = e;
-    e = (mean_correction){.n = 0};
-done:
-    mean_correction_free(&e);
-    return status;
-}
-
 lam_status mean_correction_of_halves(size_t n, size_t n_channels, const uint16_t *missing,
                                      const double *light, mean_correction *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -71,6 +55,16 @@ lam_status mean_correction_of_halves(size_t n, size_t n_channels, const uint16_t
     e = (mean_correction){.n = 0};
 done:
     mean_correction_free(&e);
+    return status;
+}
+
+lam_status mean_correction_create(size_t n, size_t n_channels, const double *missing, const double *light,
+                                  mean_correction *out, lam_error *error) {
+    uint16_t *halves = memory_allocate(n_channels, n * sizeof *halves, "operator", error);
+    if (halves == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < n * n_channels; k++) halves[k] = half_of_float((float)missing[k]);
+    const lam_status status = mean_correction_of_halves(n, n_channels, halves, light, out, error);
+    free(halves);
     return status;
 }
 
