@@ -84,8 +84,9 @@ static inline size_t tiled_part(const tiled_rows *t, size_t group, size_t plane)
 void tiled_multiply(const tiled_rows *t, const float *scaled, float *y, size_t n_threads);
 
 /* Y = A X of `count` vectors, at most TILED_WIDE, side by side, each with the bits of tiled_multiply, or,
- * where it has few columns, of tiled_multiply_columns: scaled and Y are [n + TILED_PAST][TILED_WIDE], as is
- * work; all three are aligned to a cache line. */
+ * where it has few columns, of tiled_multiply_columns: scaled and Y are [n + TILED_PAST][TILED_WIDE], work
+ * has tiled_lanes_work bytes; all three are aligned to a cache line. */
+size_t tiled_lanes_work(const tiled_rows *t);
 void tiled_multiply_lanes(const tiled_rows *t, size_t count, const float *scaled, float *Y, float *work,
                           size_t n_threads);
 

@@ -5,6 +5,7 @@
 #include "solver/operator/operator.h"
 
 #include <stdint.h>
+#include <stdlib.h>
 
 /* A pass needs the caller's vectors in position order and side by side (the adjoint: g pulled back through
  * the quantity), the answer before it is put into mesh order or handed out, and what the kind needs. */
@@ -135,6 +136,7 @@ static void light_row(const lam_operator *op, size_t c, const float *E, const fl
 typedef struct pass {
     const float *E, *H0;
     size_t count, n_selected;
+    const uint16_t *order; /* [count], the vectors of E, H0 and out that it has; NULL: the first ones */
     const uint32_t *selected;
     lam_quantity quantity;
 } pass;
@@ -143,9 +145,11 @@ typedef struct pass {
 static void list_answers(const lam_operator *op, const pass *in, size_t n_out, float *out,
                          operator_vector *vectors) {
     const size_t C = op->n_channels, n = op->n;
-    for (size_t v = 0; v < in->count; v++)
-        vectors[v] = (operator_vector){in->quantity, in->E + v * C * n,
+    for (size_t k = 0; k < in->count; k++) {
+        const size_t v = in->order != NULL ? in->order[k] : k;
+        vectors[k] = (operator_vector){in->quantity, in->E + v * C * n,
                                        in->H0 != NULL ? in->H0 + v * C * n : NULL, out + v * C * n_out};
+    }
 }
 
 /* The answers for some elements; where these are many they are picked out of whole answers. */
@@ -201,15 +205,60 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
     }
 }
 
+/* Vectors that are put in order together, some passes. */
+enum { ORDERED = 16 * OPERATOR_PASS };
+
+/* A vector of a batch and its first number that is not 0. */
+typedef struct first_light {
+    size_t at;
+    uint16_t vector;
+} first_light;
+
+static int compare_light(const void *a, const void *b) {
+    const first_light *x = a, *y = b;
+    if (x->at != y->at) return x->at < y->at ? -1 : 1;
+    return x->vector < y->vector ? -1 : 1;
+}
+
+/* Orders `count` vectors of `size` numbers by where their light begins: a pass of lamps of one place reads
+ * less of an operator than one of lamps of many. */
+static void order_by_light(size_t count, size_t size, const float *E, uint16_t *order) {
+    first_light first[ORDERED];
+    for (size_t v = 0; v < count; v++) {
+        size_t at = 0;
+        while (at < size && E[v * size + at] == 0) at++;
+        first[v] = (first_light){at, (uint16_t)v};
+    }
+    qsort(first, count, sizeof *first, compare_light);
+    for (size_t v = 0; v < count; v++) order[v] = first[v].vector;
+}
+
+/* The passes of some vectors, at most ORDERED, where the kind gives answers and several passes are needed. */
+static void apply_ordered(const lam_operator *op, size_t count, const pass *all, float *out, void *work) {
+    uint16_t order[ORDERED];
+    order_by_light(count, op->n_channels * op->n, all->E, order);
+    for (size_t r = 0; r < count; r += OPERATOR_PASS) {
+        pass one = *all;
+        one.count = count - r < OPERATOR_PASS ? count - r : OPERATOR_PASS;
+        one.order = order + r;
+        apply_pass(op, &one, out, work);
+    }
+}
+
 static void apply_passes(const lam_operator *op, size_t n_rhs, const pass *all, float *out, void *work) {
     const size_t in_size = op->n_channels * op->n;
     const size_t out_size = all->selected != NULL ? op->n_channels * all->n_selected : in_size;
-    for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
+    const bool ordered = op->kind->answer != NULL && all->selected == NULL && n_rhs > OPERATOR_PASS;
+    const size_t step = ordered ? ORDERED : OPERATOR_PASS;
+    for (size_t r = 0; r < n_rhs; r += step) {
         pass one = *all;
-        one.count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS;
+        one.count = n_rhs - r < step ? n_rhs - r : step;
         one.E += r * in_size;
         if (one.H0 != NULL) one.H0 += r * in_size;
-        apply_pass(op, &one, out + r * out_size, work);
+        if (ordered)
+            apply_ordered(op, one.count, &one, out + r * out_size, work);
+        else
+            apply_pass(op, &one, out + r * out_size, work);
     }
 }
 

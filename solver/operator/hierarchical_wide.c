@@ -211,7 +211,7 @@ size_t hierarchical_wide_bytes(const hierarchical *self) {
     size_t total = WORK_AREA_ALIGN, transform;
     if (!size_multiply(wavelet_wide_work(&self->plan, self->base.n_threads), sizeof(float), &transform) ||
         !work_area_add(&total, coefficient_bytes(self)) || !work_area_add(&total, coefficient_bytes(self)) ||
-        !work_area_add(&total, coefficient_bytes(self)) || !work_area_add(&total, transform) ||
+        !work_area_add(&total, tiled_lanes_work(&self->K[0])) || !work_area_add(&total, transform) ||
         !work_area_add(&total, self->plan.n_pieces * WIDE * sizeof(double)))
         return 0;
     return total;
@@ -224,7 +224,7 @@ static void apply(wide_channel *h, void *work) {
     const size_t n_threads = self->base.n_threads;
     float *from = work_area_take(&work, coefficient_bytes(self)),
           *to = work_area_take(&work, coefficient_bytes(self)),
-          *columns = work_area_take(&work, coefficient_bytes(self)),
+          *columns = work_area_take(&work, tiled_lanes_work(&self->K[0])),
           *transform = work_area_take(&work, wavelet_wide_work(plan, n_threads) * sizeof *transform);
     h->sums = work_area_take(&work, plan->n_pieces * sizeof *h->sums);
     memset(from + plan->n_used * WIDE, 0, TILED_PAST * WIDE * sizeof *from);

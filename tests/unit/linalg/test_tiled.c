@@ -148,7 +148,10 @@ static void scale(size_t m, const float *X, const float *step, float *out) {
             out[v * (N + TILED_PAST) + i] = i < N ? step[i] * X[v * N + i] : 0;
 }
 
-/* Vectors side by side have the bits that each has alone: lanes has room for three arrays. */
+/* Floats of three arrays side by side and of what is lit, in whole cache lines. */
+enum { LANES_ROOM = 3 * (N + TILED_PAST) * TILED_WIDE + (N + 15) / 16 * 16 };
+
+/* Vectors side by side have the bits that each has alone. */
 static void check_lanes(const tiled_rows *t, size_t count, const float *scaled, float *lanes,
                         size_t n_threads) {
     const size_t room = N + TILED_PAST;
@@ -211,7 +214,7 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
           *Y = test_allocate(VECTORS * N + TILED_PAST, sizeof *Y);
     const size_t room = N + TILED_PAST;
     float *scaled = test_allocate(VECTORS * room, sizeof *scaled),
-          *lanes = aligned_alloc(64, 3 * room * TILED_WIDE * sizeof *lanes);
+          *lanes = aligned_alloc(64, LANES_ROOM * sizeof *lanes);
     const size_t n_groups = random_groups(N, groups, step, row_step, &state);
     csr a = random_rows(N, row_step, digits, &state);
     ck_ok(tile_matrix_round(&a, n_groups, groups, step, &m, &error));
@@ -248,6 +251,13 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     check_against_double(N, K, X, Y);
     check_lanes(&t, VECTORS, scaled, lanes, 3);
     check_lanes(&t, VECTORS - 1, scaled + room, lanes, 1);
+    /* They have the same columns, which are taken side by side. */
+    for (size_t k = N; k < VECTORS * N; k++)
+        X[k] = k % N % 97 == 5 ? (float)(random_lcg_unit(&state) - .4) : 0;
+    scale(VECTORS, X, t.step, scaled);
+    ck_assert(tiled_few_columns(&t, scaled + room));
+    check_lanes(&t, VECTORS, scaled, lanes, 1);
+    check_lanes(&t, VECTORS - 1, scaled + room, lanes, 3);
     tiled_free(&t);
     tile_matrix_free(&m);
     csr_free(&a);
@@ -321,9 +331,9 @@ START_TEST(changed_tiles_stay_within_vectors) {
     }
     for (size_t k = 0; k < n_groups; k += 7) begin[k] = UINT32_MAX;
     float *x = test_allocate(N + TILED_BEYOND, sizeof *x), *y = test_allocate(room + GUARD, sizeof *y),
-          *lanes = aligned_alloc(64, 3 * room * LANES * sizeof *lanes);
+          *lanes = aligned_alloc(64, LANES_ROOM * sizeof *lanes);
     for (size_t i = 0; i < room + GUARD; i++) y[i] = kept;
-    for (size_t i = 0; i < 3 * room * LANES; i++) lanes[i] = 1;
+    for (size_t i = 0; i < LANES_ROOM; i++) lanes[i] = 1;
     for (size_t i = 0; i < N; i++) x[i] = 1;
     tiled_multiply(&t, x, y, 3);
     tiled_multiply_columns(&t, x, y);
